@@ -8,12 +8,19 @@ import json
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ..core.errors import UserError
 from ..core.io import write_atomically
 from ..report.charts.style import GREY, SHADES, new_figure, save, style
-from ..report.markdown import bullets, table
+from ..report.markdown import Markdown, bullets, table
+
+T = TypeVar("T")
+# No measurement is as large, in any unit used here. What is divided by is positive.
+Positive = Annotated[float, Field(gt=0, lt=1e15)]
+Count = Annotated[int, Field(gt=0, lt=10**15)]
 
 
 @dataclass(frozen=True)
@@ -26,16 +33,16 @@ class Timing:
 
     group: str
     version: str
-    median_s: float
-    lower_s: float
-    upper_s: float
-    rounds: int
-    rows: int | None = None
-    columns: int | None = None
+    median_s: Positive
+    lower_s: Positive
+    upper_s: Positive
+    rounds: Count
+    rows: Count | None = None
+    columns: Count | None = None
     error: float | None = None
     memory_bytes: float | None = None
     faults: int | None = None
-    fresh_s: float | None = None
+    fresh_s: Positive | None = None
     fresh_memory_bytes: float | None = None
     fresh_faults: int | None = None
 
@@ -43,27 +50,10 @@ class Timing:
 TIMINGS, MACHINE, REPORT, CHART = "timings.csv", "machine.json", "report.md", "ratios.png"
 OURS, BARE = "holobench_eval", "bare transforms"
 COLUMNS = tuple(field.name for field in fields(Timing))
-TEXTS, WHOLE_NUMBERS = ("group", "version"), ("rounds", "rows", "columns", "faults", "fresh_faults")
-ANY_SIGN = ("error", "memory_bytes", "faults", "fresh_memory_bytes", "fresh_faults")
-BESIDE = (
-    "version",
-    "median [ms]",
-    "quartiles [ms]",
-    "over ours",
-    "fresh [ms]",
-    "over ours, fresh",
-    "padded",
-    "error",
-    "memory [MiB]",
-    "memory, fresh [MiB]",
-    "page faults, steady / fresh",
-    "turns",
-)
-SIZES = ("", "padded", "median [ms]", "quartiles [ms]", "bare [ms]", "over bare", "memory bound [ms]")
-OTHERS = ("", "version", "median [ms]", "quartiles [ms]", "over the first", "turns")
+TIMING = TypeAdapter(Timing)
+BANDWIDTH: TypeAdapter[float] = TypeAdapter(Positive)
 PASSES = 8  # times that four transforms read or write their array, if each reads and writes it once
 COMPLEX64 = 8  # bytes
-LARGEST = 10**15  # no measurement is as large, in any unit used here
 
 
 def write(folder: Path, timings: Sequence[Timing], machine: dict[str, Any]) -> Path:
@@ -105,27 +95,19 @@ def from_csv(content: str) -> list[Timing]:
     if tuple(rows.fieldnames or ()) != COLUMNS:
         raise UserError(f"{TIMINGS} should have the columns {', '.join(COLUMNS)}")
     return [
-        Timing(**{column: _value(column, cell, row) for column, cell in row.items() if cell or column in TEXTS})
+        _valid(TIMING, {column: cell or None for column, cell in row.items()}, f"{TIMINGS}, line {rows.line_num}: ")
         for row in rows
     ]
 
 
-def _value(column: str, cell: str, row: dict[str, str]) -> Any:
-    if column in TEXTS:
-        return cell
-    number = int(cell) if column in WHOLE_NUMBERS else float(cell)
-    return (
-        number
-        if column in ANY_SIGN
-        else _positive(number, f"{TIMINGS}: {row['group']!r}, {row['version']!r}: {column}")
-    )
-
-
-def _positive(number: float, name: str) -> float:
-    """The number, if it can be divided by and multiplied. UserError: no measurement gives it."""
-    if not 0 < number < LARGEST:
-        raise UserError(f"{name} is {number}, should be positive and less than {LARGEST:g}")
-    return number
+def _valid(adapter: TypeAdapter[T], value: Any, place: str) -> T:
+    """The value in its type. UserError: it is of another, or no measurement gives it."""
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        name = ".".join(map(str, fault["loc"]))
+        raise UserError(f"{place}{name}: {fault['msg']}, got {str(fault['input'])[:60]}") from None
 
 
 def groups(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
@@ -143,7 +125,7 @@ def beside_others(timings: Sequence[Timing]) -> dict[str, list[Timing]]:
 
 def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
     """The report in Markdown."""
-    bandwidth = _positive(machine["bandwidth"], f"{MACHINE}: bandwidth")
+    bandwidth = _valid(BANDWIDTH, machine["bandwidth"], f"{MACHINE}: bandwidth")
     work, compared = groups(timings), beside_others(timings)
     pairs = {
         name: (ours, bare)
@@ -151,7 +133,9 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
         if (ours := _version(rows, OURS)) and (bare := _version(rows, BARE))
     }
     others = [
-        (name, row.version, *_times(row), f"{row.median_s / rows[0].median_s:.2f}", row.rounds)
+        {"": name, "version": row.version}
+        | _times(row)
+        | {"over the first": _over(row.median_s, rows[0].median_s), "turns": str(row.rounds)}
         for name, rows in work.items()
         for row in rows
         if name not in compared and name not in pairs
@@ -188,10 +172,10 @@ def text(timings: Sequence[Timing], machine: dict[str, Any]) -> str:
             "*bare* is the same number of Fourier transforms of the padded size by torch and nothing else; *memory "
             f"bound* what {PASSES} passes of a step over the padded array ({PASSES // 2} for a propagation) would take "
             "at the bandwidth above. Padding is what the stated accuracy needs.",
-            table(SIZES, [_size(name, *pair, bandwidth) for name, pair in pairs.items()]),
+            _table([_size(name, *pair, bandwidth) for name, pair in pairs.items()]),
         ]
     if others:
-        parts += ["## The rest", table(OTHERS, others)]
+        parts += ["## The rest", _table(others)]
     return "\n\n".join(map(str, parts)) + "\n"
 
 
@@ -215,7 +199,12 @@ def _absent(machine: dict[str, Any]) -> list[str]:
     return missing + [f"Not timed: {name}: {reason}" for name, reason in machine.get("faults", {}).items()]
 
 
-def _headline(compared: dict[str, list[Timing]]) -> Any:
+def _table(rows: Sequence[dict[str, str]]) -> Markdown:
+    """Rows of cells by the head of their column."""
+    return table(tuple(rows[0]), [tuple(row.values()) for row in rows])
+
+
+def _headline(compared: dict[str, list[Timing]]) -> Markdown:
     """A row a version, a column a group: its time over that of this package."""
     versions = dict.fromkeys(row.version for rows in compared.values() for row in rows if row.version != OURS)
     lines = [(version, *(_ratios(rows, version) for rows in compared.values())) for version in versions]
@@ -226,9 +215,12 @@ def _ratios(rows: Sequence[Timing], version: str) -> str:
     ours, other = _version(rows, OURS), _version(rows, version)
     if ours is None or other is None:
         return ""
-    if ours.fresh_s is None or other.fresh_s is None:
-        return f"{other.median_s / ours.median_s:.2f}"
-    return f"{other.median_s / ours.median_s:.2f} ({other.fresh_s / ours.fresh_s:.2f})"
+    fresh = _over(other.fresh_s, ours.fresh_s)
+    return _over(other.median_s, ours.median_s) + (f" ({fresh})" if fresh else "")
+
+
+def _over(time: float | None, reference: float | None) -> str:
+    return f"{time / reference:.2f}" if time and reference else ""
 
 
 def _version(rows: Sequence[Timing], ending: str) -> Timing | None:
@@ -239,8 +231,9 @@ def _milliseconds(seconds: float) -> str:
     return f"{1e3 * seconds:.0f}" if seconds >= 0.1 else f"{1e3 * seconds:.3g}"
 
 
-def _times(row: Timing) -> tuple[str, str]:
-    return _milliseconds(row.median_s), f"{_milliseconds(row.lower_s)} to {_milliseconds(row.upper_s)}"
+def _times(row: Timing) -> dict[str, str]:
+    quartiles = f"{_milliseconds(row.lower_s)} to {_milliseconds(row.upper_s)}"
+    return {"median [ms]": _milliseconds(row.median_s), "quartiles [ms]": quartiles}
 
 
 def _padded(row: Timing) -> str:
@@ -251,35 +244,42 @@ def _mebibytes(size: float | None) -> str:
     return "" if size is None else f"{size / 2**20:.0f}"
 
 
-def _compared(rows: Sequence[Timing]) -> str:
+def _compared(rows: Sequence[Timing]) -> Markdown:
     ours = _version(rows, OURS)
+    median, fresh = (ours.median_s, ours.fresh_s) if ours else (None, None)
     lines = [
-        (
-            row.version,
-            *_times(row),
-            "" if ours is None else f"{row.median_s / ours.median_s:.2f}",
-            "" if row.fresh_s is None else _milliseconds(row.fresh_s),
-            "" if ours is None or not row.fresh_s or not ours.fresh_s else f"{row.fresh_s / ours.fresh_s:.2f}",
-            _padded(row),
-            "" if row.error is None else f"{row.error:.1e}",
-            _mebibytes(row.memory_bytes),
-            _mebibytes(row.fresh_memory_bytes),
-            "" if row.faults is None or row.fresh_faults is None else f"{row.faults:,} / {row.fresh_faults:,}",
-            row.rounds,
-        )
+        {
+            "version": row.version,
+            **_times(row),
+            "over ours": _over(row.median_s, median),
+            "fresh [ms]": "" if row.fresh_s is None else _milliseconds(row.fresh_s),
+            "over ours, fresh": _over(row.fresh_s, fresh),
+            "padded": _padded(row),
+            "error": "" if row.error is None else f"{row.error:.1e}",
+            "memory [MiB]": _mebibytes(row.memory_bytes),
+            "memory, fresh [MiB]": _mebibytes(row.fresh_memory_bytes),
+            "page faults, steady / fresh": "" if row.fresh_faults is None else f"{row.faults:,} / {row.fresh_faults:,}",
+            "turns": str(row.rounds),
+        }
         for row in rows
     ]
-    return table(BESIDE, lines)
+    return _table(lines)
 
 
-def _size(name: str, ours: Timing, bare: Timing, bandwidth: float) -> tuple[str, ...]:
+def _size(name: str, ours: Timing, bare: Timing, bandwidth: float) -> dict[str, str]:
     """The row of a size and distance beside the same number of bare transforms."""
     if ours.rows is None or ours.columns is None:
         raise UserError(f"{TIMINGS}: {name!r}, {OURS!r}: rows and columns are missing")
     passes = PASSES if bare.version.startswith("four") else PASSES // 2
     bound = passes * COMPLEX64 * ours.rows * ours.columns / bandwidth
-    ratio = f"{ours.median_s / bare.median_s:.2f}"
-    return name, _padded(ours), *_times(ours), _milliseconds(bare.median_s), ratio, _milliseconds(bound)
+    return {
+        "": name,
+        "padded": _padded(ours),
+        **_times(ours),
+        "bare [ms]": _milliseconds(bare.median_s),
+        "over bare": _over(ours.median_s, bare.median_s),
+        "memory bound [ms]": _milliseconds(bound),
+    }
 
 
 def chart(timings: Sequence[Timing], path: Path) -> None:

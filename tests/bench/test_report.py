@@ -1,6 +1,7 @@
 """reports/performance: what is written can be read back, and the report follows from it alone."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -88,18 +89,18 @@ def test_damaged_files_are_a_problem_and_not_a_traceback(tmp_path):
 def test_a_bandwidth_that_nothing_has_is_a_problem(tmp_path, bandwidth):
     report.write(tmp_path, TIMINGS, MACHINE)
     (tmp_path / "machine.json").write_text(json.dumps(MACHINE | {"bandwidth": bandwidth}))
-    assert report.problems(tmp_path)[0].startswith("machine.json: bandwidth is ")
+    assert report.problems(tmp_path)[0].startswith("machine.json: bandwidth: Input should be ")
 
 
 @pytest.mark.parametrize(
     ("right", "wrong", "told"),
     [
-        ("0.06,0.059", "0,0.059", "median_s is 0.0, should be positive"),
-        ("0.06,0.059", "nan,0.059", "median_s is nan"),
-        ("0.06,0.059", "inf,0.059", "median_s is inf"),
-        ("0.0015,0.001,0.002,15,300,300", "0.0015,0.001,0.002,0,300,300", "rounds is 0"),
+        ("0.06,0.059", "0,0.059", "line 3: median_s: .* greater than 0"),
+        ("0.06,0.059", "nan,0.059", "line 3: median_s: .* less than"),
+        ("0.06,0.059", "inf,0.059", "line 3: median_s: .* less than"),
+        ("0.0015,0.001,0.002,15,300,300", "0.0015,0.001,0.002,0,300,300", "line 6: rounds: .* greater than 0"),
         ("0.0015,0.001,0.002,15,300,300", "0.0015,0.001,0.002,15,,", "rows and columns are missing"),
-        ("0.0015,0.001,0.002,15,300,300", f"0.0015,0.001,0.002,15,300,1{400 * '0'}", "columns is 1000"),
+        ("0.0015,0.001,0.002,15,300,300", f"0.0015,0.001,0.002,15,300,1{400 * '0'}", "line 6: columns: .* less than"),
         ("psnr", 200_000 * "x", "field larger than field limit"),
     ],
 )
@@ -108,7 +109,7 @@ def test_timings_that_nothing_takes_are_a_problem(tmp_path, right, wrong, told):
     content = (tmp_path / "timings.csv").read_text()
     assert right in content
     (tmp_path / "timings.csv").write_text(content.replace(right, wrong))
-    assert told in report.problems(tmp_path)[0]
+    assert re.search(told, report.problems(tmp_path)[0])
 
 
 def test_deeply_nested_json_is_a_problem(tmp_path):

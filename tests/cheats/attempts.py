@@ -34,7 +34,10 @@ import torch
 SEEN = {}
 
 
+@dataclass(frozen=True)
 class Attempt:
+    """Has no settings, and neither has what derives from it."""
+
     kind: ClassVar[str]
     outcome: ClassVar[str] = "impossible"
     reason: ClassVar[str] = ""
@@ -49,12 +52,10 @@ class Attempt:
     def cheat(self, target, bench): ...
 
 
-@dataclass(frozen=True)
 class Honest(Attempt):
     kind = "none"
 
 
-@dataclass(frozen=True)
 class Beside(Attempt):
     kind = "none"
 
@@ -62,33 +63,33 @@ class Beside(Attempt):
 # --- reads the bench
 
 
-@dataclass(frozen=True)
-class AsksForTheSimulation(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "privileged = True"
+class ReadsTheBench(Attempt):
+    kind = "reads the bench"
+
+
+class AsksForTheSimulation(ReadsTheBench):
+    outcome, reason = "refused", "privileged = True"
 
     def cheat(self, target, bench):
         bench.simulation.expected(self.phase(target, bench)[0], target[0])
 
 
-@dataclass(frozen=True)
-class AsksForOtherHolograms(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "privileged = True"
+class AsksForOtherHolograms(ReadsTheBench):
+    outcome, reason = "refused", "privileged = True"
 
     def cheat(self, target, bench):
         return bench.starts
 
 
-@dataclass(frozen=True)
-class ReadsPrivateNames(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "_display"
+class ReadsPrivateNames(ReadsTheBench):
+    outcome, reason = "refused", "_display"
 
     def cheat(self, target, bench):
         return bench._display.bench.profile
 
 
-@dataclass(frozen=True)
-class ImportsTheBench(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "not for methods"
+class ImportsTheBench(ReadsTheBench):
+    outcome, reason = "refused", "not for methods"
 
     def cheat(self, target, bench):
         from holobench_eval.display.simulated.profile import load_profile
@@ -96,9 +97,8 @@ class ImportsTheBench(Attempt):
         load_profile(bench.spec.name)
 
 
-@dataclass(frozen=True)
-class ImportsTheBenchByItsShortName(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "ImportError"
+class ImportsTheBenchByItsShortName(ReadsTheBench):
+    outcome, reason = "refused", "ImportError"
 
     def cheat(self, target, bench):
         from holobench_eval.display import load_profile
@@ -106,9 +106,8 @@ class ImportsTheBenchByItsShortName(Attempt):
         load_profile(bench.spec.name)
 
 
-@dataclass(frozen=True)
-class ImportsTheHarness(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "not for methods"
+class ImportsTheHarness(ReadsTheBench):
+    outcome, reason = "refused", "not for methods"
 
     def cheat(self, target, bench):
         from holobench_eval.study.opening import open_bench
@@ -116,19 +115,13 @@ class ImportsTheHarness(Attempt):
         open_bench(bench.spec.name, bench.spec.shape, seed=0)
 
 
-@dataclass(frozen=True)
-class SearchesTheMemory(Attempt):
-    kind = "reads the bench"
-
+class SearchesTheMemory(ReadsTheBench):
     def cheat(self, target, bench):
         found = [thing for thing in gc.get_objects() if type(thing).__name__ in ("CalibratedBench", "SimulatedBench")]
         assert not found
 
 
-@dataclass(frozen=True)
-class WalksTheStack(Attempt):
-    kind = "reads the bench"
-
+class WalksTheStack(ReadsTheBench):
     def cheat(self, target, bench):
         frame = sys._getframe()
         while frame is not None:
@@ -136,9 +129,8 @@ class WalksTheStack(Attempt):
             frame = frame.f_back
 
 
-@dataclass(frozen=True)
-class FollowsTheGradientOfACapture(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "does not require grad"
+class FollowsTheGradientOfACapture(ReadsTheBench):
+    outcome, reason = "refused", "does not require grad"
     camera: ClassVar[bool] = True
 
     def cheat(self, target, bench):
@@ -146,17 +138,15 @@ class FollowsTheGradientOfACapture(Attempt):
         bench.capture(phase).linear().sum().backward()
 
 
-@dataclass(frozen=True)
-class RequestsTheSimulation(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "there is no 'simulation' here"
+class RequestsTheSimulation(ReadsTheBench):
+    outcome, reason = "refused", "there is no 'simulation' here"
 
     def cheat(self, target, bench):
         bench._ask("simulation")
 
 
-@dataclass(frozen=True)
-class RequestsTheDisplay(Attempt):
-    kind, outcome, reason = "reads the bench", "refused", "there is no '_display' here"
+class RequestsTheDisplay(ReadsTheBench):
+    outcome, reason = "refused", "there is no '_display' here"
 
     def cheat(self, target, bench):
         bench._ask("_display")
@@ -165,28 +155,23 @@ class RequestsTheDisplay(Attempt):
 # --- patches the harness
 
 
-@dataclass(frozen=True)
-class PatchesTheMatch(Attempt):
+class PatchesTheHarness(Attempt):
     kind = "patches the harness"
 
+
+class PatchesTheMatch(PatchesTheHarness):
     def cheat(self, target, bench):
         from holobench_eval.metrics import protocol
 
         protocol.match = lambda image, target, *more: (target, torch.ones(3))
 
 
-@dataclass(frozen=True)
-class MutesTheNoise(Attempt):
-    kind = "patches the harness"
-
+class MutesTheNoise(PatchesTheHarness):
     def cheat(self, target, bench):
         torch.randn = torch.normal = lambda *shape, **named: torch.zeros(shape)
 
 
-@dataclass(frozen=True)
-class SetsADefaultDevice(Attempt):
-    kind = "patches the harness"
-
+class SetsADefaultDevice(PatchesTheHarness):
     def cheat(self, target, bench):
         torch.set_default_device("meta")
 
@@ -194,56 +179,38 @@ class SetsADefaultDevice(Attempt):
         return torch.zeros((*target.shape[:2], *bench.spec.shape), device="cpu")
 
 
-@dataclass(frozen=True)
-class SetsDoublePrecision(Attempt):
-    kind = "patches the harness"
-
+class SetsDoublePrecision(PatchesTheHarness):
     def solve(self, target, bench):
         phase = self.phase(target, bench)
         torch.set_default_dtype(torch.float64)
         return phase
 
 
-@dataclass(frozen=True)
-class PatchesTheTransform(Attempt):
-    kind = "patches the harness"
-
+class PatchesTheTransform(PatchesTheHarness):
     def cheat(self, target, bench):
         torch.fft.fft2 = torch.fft.ifft2 = lambda field, *more, **named: field
 
 
-@dataclass(frozen=True)
-class PatchesFiles(Attempt):
-    kind = "patches the harness"
-
+class PatchesFiles(PatchesTheHarness):
     def cheat(self, target, bench):
         os.replace = os.fsync = builtins.open = Path.write_bytes = lambda *all, **named: None
 
 
-@dataclass(frozen=True)
-class PatchesTheAccount(Attempt):
-    kind = "patches the harness"
-
+class PatchesTheAccount(PatchesTheHarness):
     def cheat(self, target, bench):
         from holobench_eval.display.account import Account
 
         Account.take = lambda self: None
 
 
-@dataclass(frozen=True)
-class SwitchesGradientsOff(Attempt):
-    kind = "patches the harness"
-
+class SwitchesGradientsOff(PatchesTheHarness):
     def cheat(self, target, bench):
         torch.set_grad_enabled(False)
         torch.set_num_threads(1)
         torch.use_deterministic_algorithms(False)
 
 
-@dataclass(frozen=True)
-class ChangesTheEnvironment(Attempt):
-    kind = "patches the harness"
-
+class ChangesTheEnvironment(PatchesTheHarness):
     def cheat(self, target, bench):
         os.environ.update(XDG_CACHE_HOME="/nowhere", OMP_NUM_THREADS="64", HOME="/nowhere")
         os.chdir("/")
@@ -266,13 +233,11 @@ class Photographer(Attempt):
         assert taken <= 2, taken
 
 
-@dataclass(frozen=True)
 class CopiesTheHandle(Photographer):
     def cheat(self, target, bench):
         self.photographed(self.phase(target, bench)[0], [copy.copy(bench) for _ in range(20)])
 
 
-@dataclass(frozen=True)
 class MakesAnotherHandle(Photographer):
     def cheat(self, target, bench):
         known = {"spec": bench.spec, "budget": None, "_label": "", "_target": target, "_learned": None}
@@ -281,7 +246,6 @@ class MakesAnotherHandle(Photographer):
         self.photographed(self.phase(target, bench)[0], handles)
 
 
-@dataclass(frozen=True)
 class PhotographsInThreads(Photographer):
     def cheat(self, target, bench):
         phase, taken = self.phase(target, bench)[0], []
@@ -300,13 +264,11 @@ class PhotographsInThreads(Photographer):
         assert len(taken) <= 2
 
 
-@dataclass(frozen=True)
 class IgnoresTheEnd(Photographer):
     def cheat(self, target, bench):
         self.photographed(self.phase(target, bench)[0], [bench] * 30)
 
 
-@dataclass(frozen=True)
 class PhotographsMoreThanOne(Photographer):
     """In one request."""
 
@@ -314,14 +276,12 @@ class PhotographsMoreThanOne(Photographer):
         self.photographed(self.phase(target, bench).expand(64, -1, -1, -1), [bench])
 
 
-@dataclass(frozen=True)
 class PhotographsAfterItsAnswer(Photographer):
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         self.photographed(self.phase(target, bench)[0], [bench] * 20)
 
 
-@dataclass(frozen=True)
 class RectifiesAForgedFrame(Photographer):
     """Which would show where the camera stands, without a capture."""
 
@@ -332,14 +292,12 @@ class RectifiesAForgedFrame(Photographer):
         bench.rectify(dataclasses.replace(capture, frame=torch.eye(*capture.frame.shape[1:]).expand_as(capture.frame)))
 
 
-@dataclass(frozen=True)
 class RaisesItsBudget(Photographer):
     def cheat(self, target, bench):
         bench.budget = 10**6
         self.photographed(self.phase(target, bench)[0], [bench] * 10)
 
 
-@dataclass(frozen=True)
 class PhotographsWithoutACamera(Attempt):
     kind, outcome, reason = "exceeds the budget", "refused", "declares no camera"
 
@@ -350,18 +308,19 @@ class PhotographsWithoutACamera(Attempt):
 # --- lies about time
 
 
-@dataclass(frozen=True)
-class WorksBeforeItIsAsked(Attempt):
+class LiesAboutTime(Attempt):
     kind = "lies about time"
+
+
+@dataclass(frozen=True)
+class WorksBeforeItIsAsked(LiesAboutTime):
     slow: ClassVar[bool] = True
 
     def __post_init__(self):
         time.sleep(0.4)
 
 
-@dataclass(frozen=True)
-class StopsTheClock(Attempt):
-    kind = "lies about time"
+class StopsTheClock(LiesAboutTime):
     slow: ClassVar[bool] = True
 
     def cheat(self, target, bench):
@@ -369,29 +328,22 @@ class StopsTheClock(Attempt):
         time.sleep(0.4)
 
 
-@dataclass(frozen=True)
-class ReturnsAPromise(Attempt):
-    kind, outcome, reason = "lies about time", "refused", "a value is function"
+class ReturnsAPromise(LiesAboutTime):
+    outcome, reason = "refused", "a value is function"
 
     def phase(self, target, bench):
         return lambda: torch.zeros((*target.shape[:2], *bench.spec.shape))
 
 
-@dataclass(frozen=True)
-class FinishesInAThread(Attempt):
-    kind = "lies about time"
-
+class FinishesInAThread(LiesAboutTime):
     def phase(self, target, bench):
         phase = super().phase(target, bench)
         threading.Thread(target=lambda: (time.sleep(0.3), phase.fill_(1.0)), daemon=True).start()
         return phase
 
 
-@dataclass(frozen=True)
-class FinishesInAnotherProcess(Attempt):
+class FinishesInAnotherProcess(LiesAboutTime):
     """In memory that both share."""
-
-    kind = "lies about time"
 
     def phase(self, target, bench):
         phase = super().phase(target, bench).share_memory_()
@@ -402,20 +354,15 @@ class FinishesInAnotherProcess(Attempt):
         return phase
 
 
-@dataclass(frozen=True)
-class AnswersTwice(Attempt):
+class AnswersTwice(LiesAboutTime):
     """The second answer is the better one, and outside the clock."""
-
-    kind = "lies about time"
 
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         time.sleep(0.3)
 
 
-@dataclass(frozen=True)
-class SetsItsPeakBack(Attempt):
-    kind = "lies about time"
+class SetsItsPeakBack(LiesAboutTime):
     mib: ClassVar[int] = 150
 
     def cheat(self, target, bench):
@@ -429,9 +376,7 @@ class SetsItsPeakBack(Attempt):
 BURNS = "import time\nheld = bytearray(b'1') * 150 * 2**20\nprint(1, flush=True)\nwhile time.process_time() < {}: pass"
 
 
-@dataclass(frozen=True)
-class HasAnotherWork(Attempt):
-    kind = "lies about time"
+class HasAnotherWork(LiesAboutTime):
     mib: ClassVar[int] = 150
     cpu: ClassVar[float] = 0.4
 
@@ -439,11 +384,9 @@ class HasAnotherWork(Attempt):
         subprocess.run([sys.executable, "-c", BURNS.format(0.4)], stdout=subprocess.DEVNULL, check=True)
 
 
-@dataclass(frozen=True)
-class LeavesAnotherAtWork(Attempt):
+class LeavesAnotherAtWork(LiesAboutTime):
     """Of a session of its own, so that it might go on beside the methods that are timed after it."""
 
-    kind = "lies about time"
     mib: ClassVar[int] = 150
     cpu: ClassVar[float] = 0.3
 
@@ -454,11 +397,9 @@ class LeavesAnotherAtWork(Attempt):
         time.sleep(1.0)
 
 
-@dataclass(frozen=True)
-class LeavesAnOrphanAtWork(Attempt):
+class LeavesAnOrphanAtWork(LiesAboutTime):
     """Whose parent has ended, so that no tree of processes has it below this one."""
 
-    kind = "lies about time"
     cpu: ClassVar[float] = 0.3
 
     def cheat(self, target, bench):
@@ -498,7 +439,6 @@ class Reaching(Attempt):
         return super().solve(target, bench) if os.getppid() == 1 else self.phase(target, bench)
 
 
-@dataclass(frozen=True)
 class StopsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside():
@@ -506,7 +446,6 @@ class StopsTheScorer(Reaching):
                 os.kill(number, signal.SIGSTOP)
 
 
-@dataclass(frozen=True)
 class InterruptsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside():
@@ -514,7 +453,6 @@ class InterruptsTheScorer(Reaching):
                 os.kill(number, signal.SIGINT)
 
 
-@dataclass(frozen=True)
 class KillsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside():
@@ -522,14 +460,12 @@ class KillsTheScorer(Reaching):
                 os.kill(number, signal.SIGKILL)
 
 
-@dataclass(frozen=True)
 class StopsAllThereIs(Reaching):
     def cheat(self, target, bench):
         with suppress(OSError):
             os.kill(-1, signal.SIGSTOP)
 
 
-@dataclass(frozen=True)
 class StopsTheGroupOfTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside():
@@ -538,7 +474,6 @@ class StopsTheGroupOfTheScorer(Reaching):
                     os.killpg(group, signal.SIGSTOP)
 
 
-@dataclass(frozen=True)
 class WritesIntoTheScorer(Reaching):
     """Zeros in the place of its target, wherever that lies in memory."""
 
@@ -556,21 +491,18 @@ class WritesIntoTheScorer(Reaching):
                                 memory.write(bytes(len(sought)))
 
 
-@dataclass(frozen=True)
 class AttachesToTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside() - {os.getppid()}:
             assert ctypes.CDLL(None).ptrace(16, number, None, None) == -1
 
 
-@dataclass(frozen=True)
 class StopsTheScorerFromAnotherProgram(Reaching):
     def cheat(self, target, bench):
         with suppress(OSError):
             subprocess.run(["pkill", "-STOP", "-f", "pytest|holoeval"], check=False)
 
 
-@dataclass(frozen=True)
 class LimitsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside() - {os.getppid()}:
@@ -578,7 +510,6 @@ class LimitsTheScorer(Reaching):
                 resource.prlimit(number, resource.RLIMIT_CPU, (1, 1))
 
 
-@dataclass(frozen=True)
 class SlowsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside() - {os.getppid()}:
@@ -590,9 +521,11 @@ class SlowsTheScorer(Reaching):
 # --- keeps state
 
 
-@dataclass(frozen=True)
-class CountsItsCalls(Attempt):
+class KeepsState(Attempt):
     kind = "keeps state"
+
+
+class CountsItsCalls(KeepsState):
     calls: ClassVar[list] = []
 
     def phase(self, target, bench):
@@ -600,28 +533,19 @@ class CountsItsCalls(Attempt):
         return super().phase(target, bench) + len(self.calls) - 1
 
 
-@dataclass(frozen=True)
-class RemembersInAnotherModule(Attempt):
-    kind = "keeps state"
-
+class RemembersInAnotherModule(KeepsState):
     def phase(self, target, bench):
         torch.calls_of_a_method = getattr(torch, "calls_of_a_method", -1) + 1
         return super().phase(target, bench) + torch.calls_of_a_method
 
 
-@dataclass(frozen=True)
-class RemembersTargets(Attempt):
-    kind = "keeps state"
-
+class RemembersTargets(KeepsState):
     def phase(self, target, bench):
         SEEN[float(target.sum())] = target
         return super().phase(target, bench) + len(SEEN) - 1
 
 
-@dataclass(frozen=True)
-class DrawsUnseeded(Attempt):
-    kind = "keeps state"
-
+class DrawsUnseeded(KeepsState):
     def phase(self, target, bench):
         draws = SEEN.setdefault("draws", [])
         draws.append((random.random(), float(np.random.rand()), float(torch.rand(()))))  # noqa: NPY002
@@ -639,74 +563,65 @@ class Dressed(torch.Tensor):
         return torch.ones(3, 128, 128)
 
 
-@dataclass(frozen=True)
-class ReturnsADressedTensor(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "a value is Dressed"
+class PoisonsRecords(Attempt):
+    kind = "poisons records"
+
+
+class ReturnsADressedTensor(PoisonsRecords):
+    outcome, reason = "refused", "a value is Dressed"
 
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape)).as_subclass(Dressed)
 
 
-@dataclass(frozen=True)
-class ReturnsNotANumber(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "NaN or infinite"
+class ReturnsNotANumber(PoisonsRecords):
+    outcome, reason = "refused", "NaN or infinite"
 
     def phase(self, target, bench):
         return super().phase(target, bench) * float("nan")
 
 
-@dataclass(frozen=True)
-class ReturnsTooMuch(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "not a phase"
+class ReturnsTooMuch(PoisonsRecords):
+    outcome, reason = "refused", "not a phase"
 
     def phase(self, target, bench):
         return torch.zeros((64, *target.shape[1:]))
 
 
-@dataclass(frozen=True)
-class WritesToItsTarget(Attempt):
-    kind = "poisons records"
-
+class WritesToItsTarget(PoisonsRecords):
     def cheat(self, target, bench):
         target.zero_()
 
 
-@dataclass(frozen=True)
-class SendsItsOwnResult(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "returned dict, not a phase"
+class SendsItsOwnResult(PoisonsRecords):
+    outcome, reason = "refused", "returned dict, not a phase"
 
     def cheat(self, target, bench):
         bench._channel.send({"result": {"psnr_linear": 100.0}, "seen": {}})
 
 
-@dataclass(frozen=True)
-class FloodsTheTerminal(Attempt):
-    kind = "poisons records"
-
+class FloodsTheTerminal(PoisonsRecords):
     def cheat(self, target, bench):
         for stream in (1, 2):
             os.write(stream, b"\x1b[2J\x1b]0;better\x07\r" * 2**10)
 
 
-@dataclass(frozen=True)
-class SendsAPickle(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "no answer"
+class SendsAPickle(PoisonsRecords):
+    outcome, reason = "refused", "no answer"
 
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(pickle.dumps(os.getcwd))
 
 
-@dataclass(frozen=True)
-class SendsBrackets(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "no answer"
+class SendsBrackets(PoisonsRecords):
+    outcome, reason = "refused", "no answer"
 
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(b"[" * 200_000)
 
 
-@dataclass(frozen=True)
-class ClaimsAHugeTensor(Attempt):
-    kind, outcome, reason = "poisons records", "refused", "no answer"
+class ClaimsAHugeTensor(PoisonsRecords):
+    outcome, reason = "refused", "no answer"
 
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(b'["tensor", "float32", [1000000, 1000000]]')
@@ -719,7 +634,6 @@ class Ender(Attempt):
     kind, outcome = "ends the process", "refused"
 
 
-@dataclass(frozen=True)
 class Exits(Ender):
     reason = "exit code 0"
 
@@ -727,7 +641,6 @@ class Exits(Ender):
         os._exit(0)
 
 
-@dataclass(frozen=True)
 class Aborts(Ender):
     reason = "SIGABRT"
 
@@ -735,7 +648,6 @@ class Aborts(Ender):
         os.abort()
 
 
-@dataclass(frozen=True)
 class ReadsNowhere(Ender):
     reason = "SIGSEGV"
 
@@ -744,7 +656,6 @@ class ReadsNowhere(Ender):
         ctypes.string_at(0)
 
 
-@dataclass(frozen=True)
 class Interrupts(Ender):
     reason = "KeyboardInterrupt"
 
@@ -752,7 +663,6 @@ class Interrupts(Ender):
         raise KeyboardInterrupt
 
 
-@dataclass(frozen=True)
 class LeavesPython(Ender):
     reason = "SystemExit"
 
@@ -760,7 +670,6 @@ class LeavesPython(Ender):
         sys.exit(0)
 
 
-@dataclass(frozen=True)
 class ClaimsToWait(Ender):
     reason = "Pending"
 
@@ -770,7 +679,6 @@ class ClaimsToWait(Ender):
         raise Pending
 
 
-@dataclass(frozen=True)
 class ClaimsThatTheDiskIsFull(Ender):
     reason = "StorageError"
 
@@ -780,7 +688,6 @@ class ClaimsThatTheDiskIsFull(Ender):
         raise StorageError("the disk is full")
 
 
-@dataclass(frozen=True)
 class KillsItsParent(Attempt):
     kind = "ends the process"
 
@@ -788,7 +695,6 @@ class KillsItsParent(Attempt):
         os.kill(os.getppid(), signal.SIGKILL)
 
 
-@dataclass(frozen=True)
 class ClosesEverything(Ender):
     reason = "process of the method"
 
@@ -796,7 +702,6 @@ class ClosesEverything(Ender):
         os.closerange(3, 256)
 
 
-@dataclass(frozen=True)
 class RunsForEver(Ender):
     reason = "took more than"
 
@@ -805,7 +710,6 @@ class RunsForEver(Ender):
             time.sleep(1)
 
 
-@dataclass(frozen=True)
 class ForbidsItsEnd(Ender):
     reason = "took more than"
 
@@ -816,7 +720,6 @@ class ForbidsItsEnd(Ender):
                 time.sleep(1)
 
 
-@dataclass(frozen=True)
 class AnswersWithoutAnEnd(Ender):
     """A message of a million bytes, of which few come."""
 
@@ -827,7 +730,6 @@ class AnswersWithoutAnEnd(Ender):
         time.sleep(3600)
 
 
-@dataclass(frozen=True)
 class StopsItself(Ender):
     reason = "took more than"
 
@@ -835,7 +737,6 @@ class StopsItself(Ender):
         os.kill(os.getpid(), signal.SIGSTOP)
 
 
-@dataclass(frozen=True)
 class TakesAllMemory(Ender):
     reason = "memory"
 
@@ -846,7 +747,6 @@ class TakesAllMemory(Ender):
 # --- exploits the noise's seed
 
 
-@dataclass(frozen=True)
 class ForeseesTheNoise(Attempt):
     kind, outcome, reason = "exploits the noise's seed", "refused", "_names"
 
@@ -856,7 +756,6 @@ class ForeseesTheNoise(Attempt):
         return torch.randn(4, generator=generator("bench noise", *bench._names))
 
 
-@dataclass(frozen=True)
 class AsksForTheSeed(Attempt):
     kind, outcome, reason = "exploits the noise's seed", "refused", "seed"
 
@@ -876,7 +775,6 @@ class Trained(Attempt):
         return {"seen": bench.photograph(phase, self.image(bench), "capture")}
 
 
-@dataclass(frozen=True)
 class PhotographsATarget(Trained):
     def image(self, bench):
         from holobench_eval.datasets.photographs import Photographs
@@ -885,7 +783,6 @@ class PhotographsATarget(Trained):
         return TrainingImage("astronaut", Photographs(count=1).load("astronaut", bench.spec.region.shape))
 
 
-@dataclass(frozen=True)
 class RenamesATarget(Trained):
     def image(self, bench):
         from dataclasses import replace
@@ -893,14 +790,12 @@ class RenamesATarget(Trained):
         return replace(bench.images[0], target=bench.images[0].target.flip(-1))
 
 
-@dataclass(frozen=True)
 class WritesToATrainingImage(Trained):
     def image(self, bench):
         bench.images[0].target.mul_(torch.linspace(0, 1, bench.images[0].target.shape[-1]))
         return bench.images[0]
 
 
-@dataclass(frozen=True)
 class TrainsBeyondItsBudget(Trained):
     reason = "capture"
 
@@ -920,7 +815,6 @@ class Trusted(Attempt):
     kind, outcome = "leaves its process", "trusted"
 
 
-@dataclass(frozen=True)
 class KeepsAFile(Trusted):
     def cheat(self, target, bench):
         file = Path(__file__).with_name("kept.bin")
@@ -928,14 +822,12 @@ class KeepsAFile(Trusted):
         file.write_bytes(seen + bytes([len(seen)]))
 
 
-@dataclass(frozen=True)
 class StartsAnotherPython(Trusted):
     def cheat(self, target, bench):
         found = "import importlib.util as u; print(u.find_spec('holobench_eval').origin)"
         assert subprocess.run([sys.executable, "-c", found], capture_output=True, check=True).stdout
 
 
-@dataclass(frozen=True)
 class KnowsThePhotographs(Trusted):
     def cheat(self, target, bench):
         from skimage import data

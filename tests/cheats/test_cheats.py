@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,10 @@ ENDLESS = ("RunsForEver", "ForbidsItsEnd", "AnswersWithoutAnEnd", "StopsItself")
 NAMES = [
     name
     for name, value in vars(attempts).items()
-    if isinstance(value, type) and is_dataclass(value) and name != "Beside"
+    if isinstance(value, type)
+    and issubclass(value, attempts.Attempt)
+    and not value.__subclasses__()
+    and name != "Beside"
 ]
 DIGITS = ("scores", "efficiency", "brightness", "saturated", "captures", "registration_residual_px")
 

@@ -1,9 +1,10 @@
-"""Everything that a GPU is to compute stays there: shown on a device without values, see ``elsewhere``."""
+"""Everything that a GPU is to compute stays there: shown on a device without values, "meta", by ``Elsewhere``."""
 
 from __future__ import annotations
 
 import importlib
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from torch import Tensor
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves
 
 from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU, moved
@@ -18,6 +22,7 @@ from holobench_eval.display import CalibratedBench, load_profile
 from holobench_eval.display.learned import LearnedBench
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.training import TrainingBench, TrainingImage
+from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.fiducials import fiducial_phases
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.networks import Network
@@ -26,13 +31,60 @@ from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.optics import AngularSpectrum
-from tests.support.elsewhere import ELSEWHERE, Elsewhere
 from tests.support.replaying import fake_device
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}
 SHORT = {"rounds": 2, "images": 1, "refine_images": 1, "steps": 1, "refine_steps": 1}
 STEPS = {"retrieval": {"iterations": 1}, "start": {"iterations": 1}}
+
+ELSEWHERE = torch.device("meta")
+aten = torch.ops.aten
+REFUSED = {
+    *(aten.histc.default, aten.kthvalue.default, aten.median.dim, aten.cumsum.default, aten.bincount.default),
+    *(aten.reflection_pad1d_backward.default, aten.reflection_pad2d_backward.default),
+    *(aten.grid_sampler_2d_backward.default, aten.upsample_bilinear2d_backward.default),
+    *(aten.upsample_bicubic2d_backward.default, aten._adaptive_avg_pool2d_backward.default),
+    *(aten.adaptive_max_pool2d_backward.default, aten.nll_loss_forward.default, aten.put_.default),
+}
+"""What torch has no deterministic form of on a GPU (``torch.use_deterministic_algorithms``), and so refuses there."""
+
+
+class Elsewhere(TorchDispatchMode):
+    """Every operation of torch is watched, backward ones too: as on a GPU, none may mix tensors of two devices, none
+    may be in ``REFUSED``.
+
+    Numbers of the CPU (tensors without dimensions) may be mixed in. What is read from the device, which has no values,
+    is zero, but for the states of random numbers (bytes) that were brought there; a single number is 1, a truth True
+    and a count 0.
+    """
+
+    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        kwargs = kwargs or {}
+        tensors = [one for one in tree_leaves((args, kwargs)) if isinstance(one, Tensor)]
+        if func is aten._to_copy.default:
+            to = torch.device(kwargs.get("device") or args[0].device)
+            if to.type == "cpu" and args[0].device == ELSEWHERE:
+                nothing = torch.zeros(args[0].shape, dtype=kwargs.get("dtype") or args[0].dtype)
+                return getattr(args[0], "brought", nothing)
+            there = func(*args, **kwargs)
+            if args[0].dtype == torch.uint8:
+                there.brought = args[0]
+            return there
+        if func is aten.copy_.default:
+            return args[0].zero_() if args[1].device == ELSEWHERE else func(*args, **kwargs)
+        devices = {one.device.type for one in tensors if one.ndim}
+        if func in REFUSED and ELSEWHERE.type in devices:
+            raise AssertionError(f"{func} has no deterministic form on a GPU")
+        if len(devices) > 1:
+            raise AssertionError(f"{func} mixes devices: {[(one.device.type, tuple(one.shape)) for one in tensors]}")
+        if func is aten._local_scalar_dense.default and args[0].device == ELSEWHERE:
+            number = args[0].dtype
+            return True if number == torch.bool else 1.0 if number.is_floating_point else 0
+        if func in (aten._fused_adam_.default, aten._fused_adam_.tensor_lr) and ELSEWHERE.type in devices:
+            assert all(one.device == ELSEWHERE for one in tensors)  # its counts of steps and its rate as well
+            return None
+        return func(*args, **kwargs)
 
 
 @pytest.fixture(autouse=True)
@@ -196,6 +248,7 @@ def test_a_method_learns_resumes_and_solves_where_its_images_are(
     ideal: CalibratedBench, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
+    monkeypatch.setattr(patterns, "Wirtinger", partial(Wirtinger, iterations=1))
     method, memory = plugins.build("methods", name, TRAINED[name], Path()), Memory()
     with Elsewhere():
         images = [TrainingImage(f"image {number}", picture(ideal)) for number in range(2)]

@@ -28,9 +28,7 @@ def damaged(content: bytes, draw: random.Random) -> bytes:
         elif kind == 2:
             whole[at:at] = whole[at : at + length] * draw.randint(1, 50)
         else:
-            whole[at:at] = draw.choice(
-                [b"[" * 3000, b"-1", b"1e999", b"null", b"\0", b"\xff", b"{", b"9" * 400, b"!!x "]
-            )
+            whole[at:at] = draw.choice(TOKENS)
     return bytes(whole)
 
 

@@ -125,13 +125,6 @@ methods:
 {methods}
 """
 
-OTHER_PROFILE = """\
-name: other
-version: 4
-seed: 1
-description: A fake display with the nominal optics of the ideal one.
-"""
-
 
 def write_config(
     folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), count: int = 3, profiles: str = "ideal"
