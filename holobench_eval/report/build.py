@@ -15,9 +15,9 @@ from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
-from .files.pictures import keep_copies
 from .markdown import FIGURE, Markdown, blocks
 from .page import write_page
+from .page.copies import keep_copies
 from .section import Report
 from .sections import sections
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
-import cv2
-import numpy as np
+from PIL import Image
 
 from ...core.io import write_atomically
-from ..page.pictures import files, groups, planned
 from ..section import Report
+from .pictures import files, groups, planned
 
 MOST_BYTES = 3_000_000  # of all pictures of a report
 QUALITY = 85  # of WebP, 0 to 100: a sixth of the bytes of PNG
@@ -37,6 +37,6 @@ def keep_copies(report: Report) -> None:
 
 
 def _encoded(path: Path) -> bytes:
-    levels = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)
-    _, encoded = cv2.imencode(".webp", levels, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
-    return encoded.tobytes()
+    encoded = io.BytesIO()
+    Image.open(path).save(encoded, "WEBP", quality=QUALITY)
+    return encoded.getvalue()

@@ -10,8 +10,8 @@ import pytest
 
 from holobench_eval.report import Description, Results, records_frame
 from holobench_eval.report.charts.gallery import load_picture
-from holobench_eval.report.files import pictures as module
-from holobench_eval.report.files.pictures import keep_copies
+from holobench_eval.report.page import copies as module
+from holobench_eval.report.page.copies import keep_copies
 from holobench_eval.report.page.pictures import pictures
 from holobench_eval.report.section import Report
 from tests.support import synthetic_study as synthetic
