@@ -49,7 +49,6 @@ class Dataset(Protocol):
         UserError
             The source cannot be used.
         """
-        ...
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
         """Load an image as a target.
@@ -68,7 +67,6 @@ class Dataset(Protocol):
         Tensor
             ``(channels, *shape)`` linear light in [0, 1], float32.
         """
-        ...
 
     def digest(self, item: str) -> str:
         """Tell one version of an image from another.
@@ -83,7 +81,6 @@ class Dataset(Protocol):
         str
             SHA-256 (hexadecimal) of what the image is made from; it changes when the image does.
         """
-        ...
 
 
 def fit(image: Tensor, shape: tuple[int, int], resampling: Image.Resampling = Image.Resampling.BILINEAR) -> Tensor:

@@ -7,12 +7,13 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar
 
 from annotated_types import Interval, MinLen
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
+from ..core.hashing import State, file_state
 from .base import fit, looked_from, with_channels
 from .images import RIGHT, SUFFIXES, GrayImageError, SixteenBit, decode, read
 
@@ -79,7 +80,7 @@ class Folder:
     def digest(self, item: str) -> str:
         """SHA-256 of the file, which is decoded to make sure that it can be."""
         path = self._file(item)
-        digest = _checked(path, _version(path), self.gray, self.sixteen_bit)
+        digest = _checked(path, file_state(path), self.gray, self.sixteen_bit)
         self._compare(item, digest)
         return digest
 
@@ -113,7 +114,7 @@ class Folder:
             raise UserError(
                 f"{path}: no such manifest{looked_from(path)}; write one with: sha256sum *.png > SHA256SUMS"
             )
-        return _manifest(path, _version(path))
+        return _manifest(path, file_state(path))
 
     def _file(self, item: str) -> Path:
         """The path of an item that exists, is listed and lies inside the folder, links followed."""
@@ -145,32 +146,18 @@ def _is_image(name: str) -> bool:
     return not name.startswith(".") and PurePosixPath(name).suffix.lower() in SUFFIXES
 
 
-class Version(NamedTuple):
-    """Device, inode, time of change and size: what a file is recognised by without reading it."""
-
-    device: int
-    inode: int
-    changed_ns: int
-    size: int
-
-
-def _version(path: Path) -> Version:
-    state = path.stat()
-    return Version(state.st_dev, state.st_ino, state.st_mtime_ns, state.st_size)
-
-
 @lru_cache(maxsize=4096)
-def _checked(path: Path, version: Version, gray: bool, sixteen_bit: SixteenBit) -> str:
-    """SHA-256 of a file that can be decoded; remembered for this version of the file."""
+def _checked(path: Path, _state: State | None, gray: bool, sixteen_bit: SixteenBit) -> str:
+    """SHA-256 of a file that can be decoded; remembered for this state of the file."""
     content = read(path)
     decode(content, str(path), gray, sixteen_bit)
     return hashlib.sha256(content).hexdigest()
 
 
 @lru_cache(maxsize=16)
-def _manifest(path: Path, version: Version) -> dict[str, str]:
+def _manifest(path: Path, _state: State | None) -> dict[str, str]:
     """Name and sum of every line; UserError for a line of another form and for a path that leaves its folder."""
-    if version.size > LARGEST_MANIFEST:
+    if path.stat().st_size > LARGEST_MANIFEST:
         raise UserError(f"{path}: larger than {LARGEST_MANIFEST // 10**6} MB; that is no manifest")
     try:
         lines = path.read_text(encoding="utf-8").split("\n")

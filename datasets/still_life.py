@@ -31,11 +31,9 @@ class Surface(Protocol):
 
     def distance(self, start: Array, ray: Array) -> Array:
         """How many lengths of ``ray`` ``(3, ...)`` from ``start`` ``(3, ...)`` to the surface; infinite for a miss."""
-        ...
 
     def appearance(self, points: Array) -> tuple[Array, Array]:
         """Normals and reflected colours ``(3, n)`` at points ``(3, n)`` of the surface."""
-        ...
 
 
 @dataclass(frozen=True)

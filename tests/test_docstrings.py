@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 import torch
 
-from holobench_eval import display, imaging, metrics, optics
+from holobench_eval import core, datasets, display, imaging, methods, metrics, optics
 from holobench_eval.display.simulated import pipeline, profile
 
-ROOMS = (optics, imaging, metrics, display)
+ROOMS = (core, datasets, methods, optics, imaging, metrics, display)
 DOCUMENTED = [
     *((optics, name) for name in optics.__all__ if name != "Propagator"),
     *((imaging, name) for name in ("Registration", "Refined", "fiducial", "refine", "register")),

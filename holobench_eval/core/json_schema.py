@@ -1,14 +1,18 @@
-"""A JSON schema of a dataclass that files are checked by: its keys and no others, with a text for each."""
+"""A JSON schema of a dataclass that files are checked by: its keys and no others, with a text for each.
+
+Texts come from the description of a field or from the docstrings of the class and its bases, in numpy's form
+(``Parameters``) or as ``name: meaning; other: meaning``.
+"""
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
 from typing import Any, get_args, get_type_hints
 
 from pydantic import TypeAdapter
-
-from .parameters import meanings
 
 Schema = dict[str, Any]
 
@@ -40,14 +44,15 @@ def _complete(cls: type[Any], schema: Schema, definitions: Schema, done: set[int
     if id(schema) in done:
         return
     done.add(id(schema))
-    known, hints, fields = meanings(cls), get_type_hints(cls), cls.__dataclass_fields__
+    known, fields = meanings(cls), cls.__dataclass_fields__
     properties = schema.setdefault("properties", {})
     for name in [name for name in properties if not fields[name].metadata.get("key", True)]:
         del properties[name]
     for name, entry in properties.items():
-        entry["description"] = known.get(name, "")
-        for nested, part in zip(_dataclasses(hints[name]), _objects(entry, definitions), strict=False):
-            _complete(nested, part, definitions, done)
+        entry["description"] = entry.get("description") or known.get(name, "")
+        if parts := list(_objects(entry, definitions)):  # annotations may name what is imported for types alone
+            for nested, part in zip(_dataclasses(get_type_hints(cls)[name]), parts, strict=False):
+                _complete(nested, part, definitions, done)
     schema["additionalProperties"] = False
     schema.pop("description", None)
 
@@ -79,3 +84,45 @@ def _untitled(schema: Any) -> None:
         del schema["title"]
     for part in parts:
         _untitled(part)
+
+
+def meanings(cls: type[Any]) -> dict[str, str]:
+    """What docstrings say of the fields of a dataclass, by name; those of its bases where its own says nothing."""
+    found: dict[str, str] = {}
+    fields = list(getattr(cls, "__dataclass_fields__", {}))
+    for base in cls.__mro__:
+        text = inspect.cleandoc(base.__doc__ or "")
+        for name, meaning in {**_inline(text, fields), **_numpy(text)}.items():
+            if name in fields and meaning:
+                found.setdefault(name, meaning)
+    return found
+
+
+def plain(text: str) -> str:
+    """A text in one line, without signs of markup."""
+    return re.sub(r"::$", ":", " ".join(text.replace("`", "").split()))
+
+
+def _numpy(text: str) -> dict[str, str]:
+    """Meanings in a section ``Parameters``, where several names may share an entry."""
+    section = re.search(r"\nParameters\n-+\n(.*?)(?=\n\n\w+\n-{3,}\n|\Z)", f"\n{text}", re.DOTALL)
+    found = {}
+    for names, meaning in (
+        re.findall(r"^(\w[\w, ]*?)(?: :[^\n]*)?\n((?:[ \t]+[^\n]*\n?|\n)+)", section[1] + "\n", re.M) if section else ()
+    ):
+        found.update(dict.fromkeys(re.split(r",\s*", names), plain(meaning)))
+    return found
+
+
+def _inline(text: str, fields: list[str]) -> dict[str, str]:
+    """Meanings as ``name: meaning; other, another: meaning``, each at most to the end of its paragraph."""
+    if not fields:
+        return {}
+    name = rf"(?:{'|'.join(fields)})"
+    found = {}
+    for paragraph in text.split("\n\n"):
+        flat = " ".join(paragraph.split())
+        parts = re.split(rf"(?:^|(?<=[.;:)] ))({name}(?:, {name})*): ", flat)
+        for names, meaning in zip(parts[1::2], parts[2::2], strict=True):
+            found.update(dict.fromkeys(names.split(", "), plain(meaning).rstrip(".; ")))
+    return found

@@ -1,7 +1,6 @@
 """The parameters of a dataclass in words: what each may be, what it is without being given, and what it means.
 
-Types and ranges come from the annotations, by way of a JSON schema; meanings from the description of a field or from
-the docstrings of the class and its bases, in numpy's form (``Parameters``) or as ``name: meaning; other: meaning``.
+Types, ranges and meanings come by way of a JSON schema, see `json_schema`.
 """
 
 from __future__ import annotations
@@ -10,12 +9,10 @@ import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, is_dataclass
-from typing import Any, get_args, get_type_hints
+from dataclasses import dataclass
+from typing import Any
 
-from pydantic import TypeAdapter
-
-Schema = Mapping[str, Any]
+from .json_schema import Schema, json_schemas, plain, resolved
 
 _WORDS = {"integer": "whole number", "boolean": "true or false", "string": "text", "null": "null", "object": "mapping"}
 _NONE_GIVEN = "needed"
@@ -65,26 +62,21 @@ def parameters(cls: type[Any]) -> list[Parameter]:
     power | 1.0 | number | of its light [W]
     name | desk | text | of the lamp
     """
-    return list(_entries(cls, TypeAdapter(cls).json_schema(), {}, "", None))
+    schemas, definitions = json_schemas({"": cls})
+    return list(_entries(resolved(schemas[""], definitions), definitions, "", None))
 
 
-def _entries(
-    cls: type[Any] | None, schema: Schema, definitions: Schema, prefix: str, given: Any
-) -> Iterator[Parameter]:
-    definitions = schema.get("$defs", definitions)
-    known, fields = meanings(cls) if cls else {}, getattr(cls, "__dataclass_fields__", {})
+def _entries(schema: Schema, definitions: Schema, prefix: str, given: Any) -> Iterator[Parameter]:
     for name, entry in schema.get("properties", {}).items():
-        if name in fields and not fields[name].metadata.get("key", True):
-            continue
         default = entry.get("default", _NONE_GIVEN if name in schema.get("required", ()) else {})
         default = given[name] if isinstance(given, Mapping) and name in given else default
         inner = _mapping(entry, definitions)
-        meaning = entry.get("description") or known.get(name, "")
+        meaning = entry.get("description", "")
         if "properties" in inner:
             optional = "anyOf" in entry
             null = "null" if optional and default is None else ""
             yield Parameter(f"{prefix}{name}", null, "null or a mapping of:" if optional else "mapping of:", meaning)
-            yield from _entries(_nested(cls, name), inner, definitions, f"{prefix}{name}.", default)
+            yield from _entries(inner, definitions, f"{prefix}{name}.", default)
         else:
             text = default if isinstance(default, str) else json.dumps(default)
             yield Parameter(f"{prefix}{name}", text, allowed(entry, definitions), meaning)
@@ -92,28 +84,15 @@ def _entries(
 
 def _mapping(entry: Schema, definitions: Schema) -> Schema:
     """The schema of a value that is a mapping, or may be one beside null; else that of the value."""
-    parts = [_resolved(part, definitions) for part in entry.get("anyOf", ())]
+    parts = [resolved(part, definitions) for part in entry.get("anyOf", ())]
     mappings = [part for part in parts if "properties" in part]
     others = [part for part in parts if part not in mappings and part.get("type") != "null"]
-    return mappings[0] if len(mappings) == 1 and not others else _resolved(entry, definitions)
-
-
-def _resolved(entry: Schema, definitions: Schema) -> Schema:
-    """The schema behind a reference."""
-    reference = entry.get("$ref") or next((part["$ref"] for part in entry.get("allOf", ()) if "$ref" in part), None)
-    return definitions[reference.rpartition("/")[2]] if reference else entry
-
-
-def _nested(cls: type[Any] | None, name: str) -> type[Any] | None:
-    """The dataclass that a field's default is an instance of, or the one that its annotation names."""
-    hint = get_type_hints(cls).get(name) if cls else None
-    candidates = (type(getattr(cls, name, None)), hint, *get_args(hint))
-    return next((one for one in candidates if isinstance(one, type) and is_dataclass(one)), None)
+    return mappings[0] if len(mappings) == 1 and not others else resolved(entry, definitions)
 
 
 def allowed(entry: Schema, definitions: Schema) -> str:
     """What a value may be, in words: ``whole number from 1 to 100``."""
-    entry = _resolved(entry, definitions)
+    entry = resolved(entry, definitions)
     if "anyOf" in entry:
         return " or ".join(dict.fromkeys(allowed(part, definitions) for part in entry["anyOf"]))
     if "enum" in entry or "const" in entry:
@@ -137,18 +116,6 @@ def _range(entry: Schema) -> str:
     return f" {', '.join(parts)}" if parts else ""
 
 
-def meanings(cls: type[Any]) -> dict[str, str]:
-    """What docstrings say of the fields of a dataclass, by name; those of its bases where its own says nothing."""
-    found: dict[str, str] = {}
-    fields = list(getattr(cls, "__dataclass_fields__", {}))
-    for base in cls.__mro__:
-        text = inspect.cleandoc(base.__doc__ or "")
-        for name, meaning in {**_inline(text, fields), **_numpy(text)}.items():
-            if name in fields and meaning:
-                found.setdefault(name, meaning)
-    return found
-
-
 def summary(cls: type[Any]) -> str:
     """A docstring as far as it is about the class, without sections and signs of markup, a line a paragraph."""
     text = inspect.cleandoc(cls.__doc__ or "")
@@ -157,41 +124,11 @@ def summary(cls: type[Any]) -> str:
     paragraphs = [
         one for one in text.split("\n\n") if not re.match(rf"(?:{'|'.join(fields) or '-'})(?:,[^:]*)?: ", one)
     ]
-    return "\n\n".join(_plain(one) for one in paragraphs)
+    return "\n\n".join(plain(one) for one in paragraphs)
 
 
 def source(cls: type[Any]) -> str:
     """The paper behind a class: the paragraphs of its file's docstring, after the first, that name a year; or empty."""
     module = inspect.getmodule(cls)
     paragraphs = inspect.cleandoc((module and module.__doc__) or "").split("\n\n")[1:]
-    return " ".join(_plain(one) for one in paragraphs if re.search(r"\b(?:19|20)\d\d\b", one))
-
-
-def _plain(text: str) -> str:
-    """A text in one line, without signs of markup."""
-    return re.sub(r"::$", ":", " ".join(text.replace("`", "").split()))
-
-
-def _numpy(text: str) -> dict[str, str]:
-    """Meanings in a section ``Parameters``, where several names may share an entry."""
-    section = re.search(r"\nParameters\n-+\n(.*?)(?=\n\n\w+\n-{3,}\n|\Z)", f"\n{text}", re.DOTALL)
-    found = {}
-    for names, meaning in (
-        re.findall(r"^(\w[\w, ]*?)(?: :[^\n]*)?\n((?:[ \t]+[^\n]*\n?|\n)+)", section[1] + "\n", re.M) if section else ()
-    ):
-        found.update(dict.fromkeys(re.split(r",\s*", names), _plain(meaning)))
-    return found
-
-
-def _inline(text: str, fields: list[str]) -> dict[str, str]:
-    """Meanings as ``name: meaning; other, another: meaning``, each at most to the end of its paragraph."""
-    if not fields:
-        return {}
-    name = rf"(?:{'|'.join(fields)})"
-    found = {}
-    for paragraph in text.split("\n\n"):
-        flat = " ".join(paragraph.split())
-        parts = re.split(rf"(?:^|(?<=[.;:)] ))({name}(?:, {name})*): ", flat)
-        for names, meaning in zip(parts[1::2], parts[2::2], strict=True):
-            found.update(dict.fromkeys(names.split(", "), _plain(meaning).rstrip(".; ")))
-    return found
+    return " ".join(plain(one) for one in paragraphs if re.search(r"\b(?:19|20)\d\d\b", one))

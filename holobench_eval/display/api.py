@@ -224,11 +224,9 @@ class Camera(Protocol):
 
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Tell which phases ``(C, H, W)`` [rad] are captured next, so that they can be captured in one go."""
-        ...
 
     def capture(self, phase: Tensor) -> Capture:
         """Show ``phase`` ``(C, H, W)`` [rad, any range: the display wraps it] and photograph the image plane."""
-        ...
 
 
 class Simulation(Protocol):
@@ -237,7 +235,6 @@ class Simulation(Protocol):
     @property
     def gains(self) -> tuple[float, ...]:
         """Phase gains of a frame, equal in weight, whose mean stands for that over flicker."""
-        ...
 
     def expected(self, phase: Tensor, target: Tensor, gain: float = 1.0) -> tuple[Tensor, Tensor]:
         """Mean and variance of what is scored, over the noise of the camera; differentiable in the phase.
@@ -259,7 +256,6 @@ class Simulation(Protocol):
         mean, variance
             Each ``(C, h, w)``, in the unit of ``RectifiedCapture.image`` and in its square.
         """
-        ...
 
 
 class Display(Protocol):
@@ -268,21 +264,17 @@ class Display(Protocol):
     @property
     def seed(self) -> int:
         """What all random numbers of the display depend on."""
-        ...
 
     @property
     def spec(self) -> DisplaySpec:
         """Nominal optics, public."""
-        ...
 
     @property
     def simulation(self) -> Simulation:
         """The bench itself. CellError where there is none."""
-        ...
 
     def session(self, names: tuple[object, ...], target: Tensor) -> Camera:
         """The camera, exposed for ``target`` ``(C, h, w)``, under noise that depends on ``names``."""
-        ...
 
     def photograph(
         self, phase: Tensor, target: Tensor, item: str, repeat: int, exposure: Exposure = "equal", label: str = ""
@@ -309,11 +301,9 @@ class Display(Protocol):
         CellError
             No display can show the phase, or the camera cannot be registered.
         """
-        ...
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
         """A capture in the target's frame, on its device, ``(C, h, w)`` in the unit of ``RectifiedCapture.image``."""
-        ...
 
 
 def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:

@@ -31,7 +31,6 @@ class Predictor(Protocol):
 
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, in the unit of ``RectifiedCapture``."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ class Solver(Protocol):
 
     def solve(self, target: Tensor, bench: Any) -> Tensor:
         """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
-        ...
 
 
 # A method, and what has it solve; the phases, from where they are kept or from there.

@@ -43,15 +43,12 @@ class Memory(Protocol):
 
     def load(self, name: str) -> Value | None:
         """The value of a name; None if there is none."""
-        ...
 
     def save(self, name: str, value: Value) -> None:
         """Keep a value, in the place of an older one of that name."""
-        ...
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
         """Append to the record of the training that people watch; a row again (after a resume) replaces the first."""
-        ...
 
 
 class TrainingBench:

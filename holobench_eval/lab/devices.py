@@ -22,23 +22,19 @@ class Slm(Protocol):
     @property
     def name(self) -> str:
         """What it calls itself, for records."""
-        ...
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns in pixels."""
-        ...
 
     def show(self, levels: Levels) -> None:
         """Show ``(H, W)`` uint8 levels, bit-exact; returns when the driver says they are shown.
 
         DeviceError when they are not: what can be read back is read back. Settling is waited for by the caller.
         """
-        ...
 
     def close(self) -> None:
         """Give the device back; more than once does nothing."""
-        ...
 
 
 class Camera(Protocol):
@@ -47,17 +43,14 @@ class Camera(Protocol):
     @property
     def name(self) -> str:
         """Model and serial number as far as it tells them, for records."""
-        ...
 
     @property
     def white(self) -> float:
         """Counts at which a sample is saturated."""
-        ...
 
     @property
     def exposures(self) -> tuple[float, float]:
         """Shortest and longest exposure [s]."""
-        ...
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """One fresh frame, ``(Hs, Ws)`` or ``(Hs, Ws, 3)`` red, green, blue, and the exposure [s] it really had.
@@ -65,8 +58,6 @@ class Camera(Protocol):
         Raw linear counts, low-justified: no gamma, white balance, denoising or automatic gain. The exposure starts
         after the call does, so that no frame of an earlier pattern is ever returned. DeviceError when no frame comes.
         """
-        ...
 
     def close(self) -> None:
         """Give the device back; more than once does nothing."""
-        ...

@@ -36,11 +36,9 @@ class Laser(Protocol):
 
     def select(self, channel: int | None) -> None:
         """Put this channel on and all others off; None: all off. Returns when it is so; DeviceError otherwise."""
-        ...
 
     def close(self) -> None:
         """Leave it as a bench without a user should be."""
-        ...
 
 
 def laser(settings: LaserSettings | None, channels: int, folder: Path, ask: Callable[[str], None]) -> Laser:

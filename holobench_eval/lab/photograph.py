@@ -56,8 +56,6 @@ class Photographer(Protocol):
 
         An exchange of files sends them out together; a live one has nothing to do.
         """
-        ...
 
     def photograph(self, request: Request) -> Photograph:
         """Show a phase and photograph it. Pending: somebody still has to. CellError: it cannot be used."""
-        ...

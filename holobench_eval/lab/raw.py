@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +29,8 @@ class RawFrame:
     black: tuple[float, float, float]
 
 
-def read_raw(source: Path | bytes, name: str = "") -> RawFrame:
-    """The counts in a RAW or DNG file, or in its bytes (``name`` stands for them in errors).
+def read_raw(content: bytes, name: str = "the RAW file") -> RawFrame:
+    """The counts in the bytes of a RAW or DNG file; name: stands for them in errors.
 
     Every group of 2x2 photosites becomes one pixel: its red, its blue, and the mean of its two greens, rounded to the
     even count, or white where either of them is saturated. So colours lie up to half a pixel apart, which a
@@ -43,20 +42,18 @@ def read_raw(source: Path | bytes, name: str = "") -> RawFrame:
     except ImportError as error:
         raise UserError(f"RAW files need the package rawpy: {installing(extra='raw')}") from error
 
-    where = name or (str(source) if isinstance(source, Path) else "the RAW file")
-    if (source.stat().st_size if isinstance(source, Path) else len(source)) > LARGEST:
-        raise UserError(f"{where}: larger than {LARGEST >> 20} MiB, no photograph")
-    data = source.read_bytes() if isinstance(source, Path) else source
-    if is_jpeg(data):
-        raise UserError(f"{where}: a JPEG, whose values are not linear in light; set the camera to RAW")
+    if len(content) > LARGEST:
+        raise UserError(f"{name}: larger than {LARGEST >> 20} MiB, no photograph")
+    if is_jpeg(content):
+        raise UserError(f"{name}: a JPEG, whose values are not linear in light; set the camera to RAW")
     try:
-        with rawpy.imread(io.BytesIO(data)) as raw:
-            return _frame(raw, where)
+        with rawpy.imread(io.BytesIO(content)) as raw:
+            return _frame(raw, name)
     except UserError:
         raise
     except Exception as error:  # a damaged file fails in many ways
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else str(error)
-        raise UserError(f"{where}: not a RAW file that LibRaw can read ({reason or type(error).__name__})") from error
+        raise UserError(f"{name}: not a RAW file that LibRaw can read ({reason or type(error).__name__})") from error
 
 
 def is_jpeg(data: bytes) -> bool:

@@ -145,7 +145,7 @@ def curved(phase: Tensor, gamma: float) -> Tensor:
 
     Examples
     --------
-    >>> curved(torch.tensor([0.0, math.pi, 3 * math.pi]), 2.0) / math.pi
+    >>> curved(torch.tensor([0.0, torch.pi, 3 * torch.pi]), 2.0) / torch.pi
     tensor([0.0000, 0.5000, 0.5000])
     """
     return TAU * (wrap(phase) / TAU) ** gamma

@@ -3,7 +3,6 @@
 import pytest
 import torch
 
-from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.datasets import charts
 from holobench_eval.datasets.charts import CHARTS, Charts
@@ -138,20 +137,6 @@ def test_the_drawings_are_those_of_this_version():
     weights = torch.linspace(0.0, 1.0, 96)[:, None] * torch.linspace(1.0, 2.0, 128)
     found = {name: float((chart(name, (96, 128)) * weights).mean()) for name in CHARTS}
     assert found == pytest.approx(GOLDEN, rel=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        ({"names": ["tv_line"]}, "unknown chart 'tv_line'; did you mean 'tv_lines'"),
-        ({"names": []}, "the list of charts is empty"),
-        ({"names": ["tv_lines", "tv_lines"]}, "'tv_lines' is given twice"),
-    ],
-)
-def test_wrong_names_are_one_line(params, message):
-    with pytest.raises(UserError) as caught:
-        plugins.build("datasets", "charts", params)
-    assert message in str(caught.value)
 
 
 def test_a_region_too_small_for_a_chart_is_refused():

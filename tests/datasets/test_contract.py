@@ -129,6 +129,37 @@ def test_every_item_has_a_cluster_where_any_has(dataset):
     assert clusters_of(dataset) == names
 
 
+@pytest.mark.parametrize(
+    ("name", "params", "message"),
+    [
+        ("charts", {"names": ["tv_line"]}, "unknown chart 'tv_line'; did you mean 'tv_lines'"),
+        ("charts", {"names": []}, "the list of charts is empty"),
+        ("charts", {"names": ["tv_lines", "tv_lines"]}, "'tv_lines' is given twice"),
+        ("photographs", {"names": ["astronut"]}, "unknown photograph 'astronut'; did you mean 'astronaut'"),
+        ("photographs", {"names": []}, "the list of photographs is empty"),
+        ("photographs", {"names": ["brick", "brick"]}, "'brick' is given twice"),
+        ("photographs", {"count": 0}, "'count'"),
+        ("photographs", {"count": 12}, "'count'"),
+        ("crops", {"names": ["coin"]}, "unknown photograph 'coin'; did you mean 'coins'"),
+        ("crops", {"names": ["coins"], "size": 320}, "has 303 x 384 pixels and no crop of 320 x 320 with a contrast"),
+        ("crops", {"each": 0}, "'each'"),
+        ("folder", {}, "'path'"),
+        ("folder", {"path": ""}, "'path'"),
+        ("folder", {"path": "x", "count": 0}, "'count'"),
+        ("folder", {"path": "x", "sixteen_bit": "yes"}, "'sixteen_bit'"),
+        ("focal_stacks", {"planes": [0.0, 0.0]}, "plane '0.0' is given twice"),
+        ("focal_stacks", {"scenes": ["shapes", "shapes"]}, "scene 'shapes' is given twice"),
+        ("focal_stacks", {"near": -2.0}, "near is to be larger than far"),
+        ("focal_stacks", {"scenes": ["shape"]}, "unknown scene 'shape'; did you mean 'shapes'?"),
+    ],
+)
+def test_wrong_parameters_are_one_line(name, params, message):
+    with pytest.raises(UserError) as caught:
+        plugins.build("datasets", name, params).items()
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_only_generated_images_are_for_training():
     training = {name: plugins.find("datasets", name).training for name in plugins.names("datasets")}
     assert training["dead_leaves"]

@@ -9,7 +9,6 @@ import torch
 from matplotlib import cbook
 from PIL import Image
 
-from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.datasets import crops, shipped
 from holobench_eval.datasets.base import clusters_of, from_srgb, named_digest
@@ -92,21 +91,6 @@ def test_two_renderings_are_the_still_lifes_of_earlier_studies_and_one_cluster()
         dataset.load("still-life-1", (40, 40)).permute(1, 2, 0),
         torch.from_numpy(still_life("still-life-1", (40, 40))[0]).float(),
     )
-
-
-@pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        ({"names": ["coin"]}, "unknown photograph 'coin'; did you mean 'coins'"),
-        ({"names": ["coins"], "size": 320}, "'coins' has 303 x 384 pixels and no crop of 320 x 320 with a contrast"),
-        ({"each": 0}, "'each'"),
-    ],
-)
-def test_wrong_parameters_are_one_line(params, message):
-    with pytest.raises(UserError) as caught:
-        plugins.build("datasets", "crops", params).items()
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_region_larger_than_a_crop_is_one_line():

@@ -116,25 +116,9 @@ def test_an_item_tells_its_scene_and_its_plane():
     assert (stacks.scene("shapes-2@-1.5mm"), stacks.plane("shapes-2@-1.5mm")) == ("shapes-2", -1.5)
 
 
-@pytest.mark.parametrize(
-    ("params", "words"),
-    [
-        ({"planes": (0.0, 0.0)}, "plane '0.0' is given twice"),
-        ({"scenes": ("shapes", "shapes")}, "scene 'shapes' is given twice"),
-        ({"near": -2.0}, "near is to be larger than far"),
-    ],
-)
-def test_a_stack_that_makes_no_sense_is_refused(params, words):
-    assert words in refused(lambda: FocalStacks(**params))
-
-
 def test_a_plane_where_nothing_is_in_focus_is_refused():
     message = refused(FocalStacks(planes=(5.0,)).items)
     assert message == ("scene 'shapes' has nothing within 0.5 mm of the plane at 5 mm; its depth goes from -2 to 2 mm")
-
-
-def test_an_unknown_scene_is_refused():
-    assert "unknown scene 'shape'; did you mean 'shapes'?" in refused(FocalStacks(("shape",)).items)
 
 
 def test_a_motorcycle_that_is_not_there_is_said_to_be_missing(monkeypatch, tmp_path):

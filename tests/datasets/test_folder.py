@@ -9,7 +9,6 @@ import pytest
 import torch
 from PIL import Image
 
-from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.datasets import folder
 from holobench_eval.datasets.folder import Folder
@@ -205,10 +204,3 @@ def test_pipes_and_unprintable_names_are_refused_without_waiting(pictures):
     (pictures / "pipe.png").unlink()
     save(pictures / "a\nb.png")
     assert "cannot be printed" in refusal(Folder(str(pictures)))
-
-
-@pytest.mark.parametrize("params", [{}, {"path": ""}, {"path": "x", "count": 0}, {"path": "x", "sixteen_bit": "yes"}])
-def test_wrong_parameters_are_one_line(params):
-    with pytest.raises(UserError) as caught:
-        plugins.build("datasets", "folder", params)
-    assert "\n" not in str(caught.value)

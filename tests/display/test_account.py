@@ -14,15 +14,12 @@ import torch
 from holobench_eval.core.errors import BudgetError, StorageError
 from holobench_eval.display import MeteredDisplay
 from holobench_eval.display.account import Account, Journal
+from tests.display.test_calibrated import Camera
 from tests.support.toy_camera import SPEC, ToyDisplay, picture
 
 
-class Seeing:
-    camera = True
-
-
 def handle(budget: int) -> MeteredDisplay:
-    return ToyDisplay().handle(Seeing(), picture(), budget)
+    return ToyDisplay().handle(Camera(), picture(), budget)
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
@@ -75,7 +72,7 @@ def test_a_journal_has_the_captures_of_all_accounts_and_a_budget_those_of_one(tm
 def test_a_capture_that_cannot_be_counted_is_not_taken(tmp_path: Path) -> None:
     (tmp_path / "journal").touch()
     display, phase = ToyDisplay(), torch.zeros(len(picture()), *SPEC.shape)
-    handle = MeteredDisplay(display, "mine", picture(), (), Seeing(), journal=Journal(tmp_path / "journal" / "one"))
+    handle = MeteredDisplay(display, "mine", picture(), (), Camera(), journal=Journal(tmp_path / "journal" / "one"))
     with pytest.raises(StorageError, match="journal"):
         handle.capture(phase)
     assert handle.captures == 0

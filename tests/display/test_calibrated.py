@@ -65,21 +65,9 @@ def test_only_privileged_methods_see_the_simulation(bench, target):
         _ = bench.for_method(Camera(), "camera", target, "t", 0).simulation
 
 
-@pytest.mark.parametrize(
-    ("phase", "message"),
-    [
-        (torch.full((3, *PANEL), float("nan")), "mine: phase holds 110592 values that are NaN"),
-        (
-            torch.full((3, *PANEL), 1e300, dtype=torch.float64),
-            "mine: phase holds 110592 values that are NaN or infinite",
-        ),
-        (torch.zeros(3, 10, 10), r"mine: phase is \(3, 10, 10\)"),
-        (torch.zeros(3, *PANEL, dtype=torch.complex64), "mine: phase is torch.complex64"),
-    ],
-)
-def test_phase_that_no_display_can_show_is_refused_by_name(bench, target, phase, message):
-    with pytest.raises(CellError, match=message):
-        bench.photograph(phase, target, "t", 0, label="mine")
+def test_phase_that_no_display_can_show_is_refused_by_name(bench, target):
+    with pytest.raises(CellError, match="mine: phase holds 110592 values that are NaN"):
+        bench.photograph(torch.full((3, *PANEL), torch.nan), target, "t", 0, label="mine")
 
 
 def test_method_cannot_reach_the_scored_target_or_its_own_account(bench, target):

@@ -16,6 +16,8 @@ from typer.testing import CliRunner
 
 import holobench_eval as hb
 from holobench_eval.commands import app
+from holobench_eval.core.errors import CellError
+from holobench_eval.display import load_profile
 from holobench_eval.display.phases import check_phase, phase_doubt
 from holobench_eval.optics.phase import FARTHEST
 
@@ -131,6 +133,26 @@ def test_a_colour_without_light_has_no_part(display: hb.OpenDisplay, target: Ten
     red = target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
     assert phase_doubt(phase, red, display.spec) == ""
     assert "opposite sign" in phase_doubt(-phase, red, display.spec)
+
+
+class Spy(torch.Tensor):
+    """A tensor that would run its own code inside the bench."""
+
+
+@pytest.mark.parametrize(
+    ("phase", "message"),
+    [
+        (torch.full((3, *PANEL), math.nan), "phase holds 49152 values that are NaN or infinite"),
+        (torch.full((3, *PANEL), 1e300, dtype=torch.float64), "phase holds 49152 values that are NaN or infinite"),
+        (torch.zeros(3, 10, 10), r"phase is \(3, 10, 10\)"),
+        (torch.zeros(2, 3, *PANEL), r"phase is \(2, 3, 128, 128\)"),
+        (torch.zeros(3, *PANEL, dtype=torch.complex64), "phase is torch.complex64"),
+        (torch.zeros(3, *PANEL).as_subclass(Spy), "phase is Spy, the display shows a plain"),
+    ],
+)
+def test_what_no_display_can_show_is_refused_by_the_name_of_its_method(phase: Tensor, message: str) -> None:
+    with pytest.raises(CellError, match=f"^mine: {message}"):
+        check_phase(phase, load_profile("ideal").spec(PANEL), "mine")
 
 
 def test_a_phase_is_shown_as_long_as_single_precision_has_its_place_in_the_turn(display: hb.OpenDisplay) -> None:

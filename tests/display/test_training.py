@@ -5,24 +5,9 @@ from holobench_eval.core.errors import BudgetError, CellError
 from holobench_eval.display import load_profile
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.study.opening import open_bench
+from tests.support.small_training import Memory
 
 PANEL = (128, 128)
-
-
-class DictMemory:
-    """Values and log in the process."""
-
-    def __init__(self):
-        self.values, self.rows = {}, []
-
-    def load(self, name):
-        return self.values.get(name)
-
-    def save(self, name, value):
-        self.values[name] = value
-
-    def log(self, row):
-        self.rows.append(dict(row))
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +24,7 @@ def images(workbench):
 
 @pytest.fixture
 def memory():
-    return DictMemory()
+    return Memory()
 
 
 @pytest.fixture
@@ -126,7 +111,7 @@ def test_a_training_that_was_stopped_goes_on_where_it_was_and_counts_every_kept_
     resumed = begin(budget=4)
     found = train(resumed, images, 4)
     assert resumed.captures == 4
-    memory.values.clear()
+    memory.kept.clear()
     whole = begin(budget=4)
     assert torch.equal(train(whole, images, 4), found)
     assert whole.captures == 4
@@ -144,8 +129,8 @@ def test_values_loaded_in_any_order_do_not_lower_the_count(begin, images):
 def test_time_before_an_interruption_counts_once(begin, memory):
     first = begin()
     first.save("a", {})
-    memory.values["a"]["seconds"] = 100.0
-    memory.values["b"] = {**memory.values["a"], "seconds": 40.0}
+    memory.kept["a"]["seconds"] = 100.0
+    memory.kept["b"] = {**memory.kept["a"], "seconds": 40.0}
     resumed = begin()
     for name in ("b", "a", "a"):
         resumed.load(name)
@@ -163,6 +148,6 @@ def test_a_kept_value_is_made_once_and_a_saved_one_replaced(begin):
 def test_a_logged_row_tells_captures_and_time(begin, images, memory):
     bench = begin()
     bench.photograph(PHASE, images[0])
-    bench.log(round=1, l1=0.5)
-    (row,) = memory.rows
-    assert row | {"seconds": 0} == {"round": 1, "l1": 0.5, "captures": 1, "seconds": 0}
+    bench.log(round=1, step=2, l1=0.5)
+    assert memory.story == [{"round": 1, "step": 2, "l1": 0.5, "captures": 1}]
+    assert memory.rows[0]["seconds"] >= 0

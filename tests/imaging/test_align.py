@@ -236,7 +236,6 @@ def test_alignments_that_agree_become_one_and_others_stay_alone():
 
     found = {"a": shifted(-0.2, 0.9), "b": shifted(0.2, 0.9), "far": shifted(9.0, 0.99)}
     common = shared(found)
-    assert common is not None
     assert common[1] == {"a", "b"}
     assert np.abs(common[0].corners() - plane(base).corners()).max() < 0.01
 
@@ -246,7 +245,6 @@ def test_a_shared_alignment_stands_only_for_those_within_a_quarter_of_a_capture_
     for apart, stands in ((0.2, {"still", "moved"}), (0.3, set())):
         moved[0, 2] = apart
         common = shared({"still": still, "moved": Alignment(plane(moved), 0.6)})
-        assert common is not None
         assert common[1] == stands
 
 
@@ -254,7 +252,6 @@ def test_where_no_two_agree_the_best_correlated_alignment_is_there_for_those_tha
     near, far = (Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1.0]])), c) for by, c in ((0, 0.9), (9, 0.8)))
     for found in ({"near": near, "far": far}, {"near": near}):
         common = shared(found)
-        assert common is not None
         assert common == (near.warp, frozenset())
     assert shared({}) is None
 
@@ -264,7 +261,6 @@ def test_the_better_correlated_alignment_counts_more():
         Alignment(plane(np.array([[1, 0, by], [0, 1, 0], [0, 0, 1.0]])), c) for by, c in ((0.0, 0.99), (0.9, 0.6))
     )
     common = shared({"better": better, "worse": worse})
-    assert common is not None
     assert 0 < common[0].corners()[0, 0] < 0.1
 
 
@@ -286,7 +282,6 @@ def test_an_alignment_survives_its_plain_form():
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real captures are not here")
 def test_a_real_capture_shows_no_other_picture():
     pixels = cv2.imread(str(REAL / "sgd-ours.png"))
-    assert pixels is not None
     capture = np.ascontiguousarray(pixels[..., ::-1].transpose(2, 0, 1), dtype=np.float32) / 255
     for name in ("astronaut", "coffee"):
         with pytest.raises(CellError, match="not found"):

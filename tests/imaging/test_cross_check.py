@@ -42,7 +42,6 @@ def test_it_finds_the_grid_where_it_is_whatever_the_first_one_says(contrast):
         for pixels in (0.2, 5.0):
             first = wrong(pose, pixels)
             second = second_warp(frame, grid, first)
-            assert second is not None
             assert disagreement(first, second) == pytest.approx(pixels, abs=0.8)
             apart.append(pose.corner_error(second.corners()))
     assert np.median(apart) < 0.4
@@ -55,7 +54,6 @@ def test_a_photograph_scores_the_same_through_it_as_through_the_truth(number, co
     target = scene(pose.shape)
     frame = photograph(pose, target)
     second = second_warp(frame, target, wrong(pose, 3.0))
-    assert second is not None
     assert psnr(frame, second, target) == pytest.approx(psnr(frame, wrong(pose, 0.0), target), abs=0.2)
 
 
@@ -72,7 +70,6 @@ def test_it_fits_a_distortion_of_its_own_where_the_first_has_one():
     back = (2 * np.stack([x, y], axis=-1) - straight).astype(np.float32)
     frame = photograph(pose, cv2.remap(grid, back, None, cv2.INTER_CUBIC))
     second = second_warp(frame, grid, replace(bent, quadratic=0.7 * bend))
-    assert second is not None
     assert disagreement(bent, second) < 0.5
     assert disagreement(bent, wrong(pose, 0.0)) > 1.5
 
@@ -107,5 +104,4 @@ def test_on_real_captures_it_finds_the_stated_crop(name):
     moved = crop @ np.array([[1, 0, 4], [0, 1, -3], [0, 0, 1]])
     first = Warp((800, 800), moved, np.zeros((6, 2)))
     second = second_warp(frame.astype(np.float32), target.astype(np.float32), first)
-    assert second is not None
     assert disagreement(Warp((800, 800), crop, np.zeros((6, 2))), second) < 0.5

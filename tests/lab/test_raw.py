@@ -1,7 +1,6 @@
 """RAW files become the counts of the sensor, untouched."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -38,12 +37,6 @@ def test_a_green_pair_with_one_saturated_site_is_saturated(bayer_dng: Callable[.
     mosaic = np.full((64, 96), 1000, np.uint16)
     mosaic[0, 1] = 16383
     assert read_raw(bayer_dng(mosaic)).counts[0, 0].tolist() == [1000, 16383, 1000]
-
-
-def test_a_file_is_read_as_its_bytes_are(bayer_dng: Callable[..., bytes], tmp_path: Path) -> None:
-    path = tmp_path / "capture.dng"
-    path.write_bytes(bayer_dng(MOSAIC))
-    assert np.array_equal(read_raw(path).counts, read_raw(path.read_bytes()).counts)
 
 
 def test_what_is_no_raw_file_is_refused_in_one_line(bayer_dng: Callable[..., bytes]) -> None:

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core import seeds
-from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
+from holobench_eval.display.api import DisplaySpec, Region, ideal_image, white_irradiance
 
 
 @pytest.fixture(autouse=True, scope="package")
@@ -26,12 +26,7 @@ class BentSimulation:
     seen: list[Tensor] = field(default_factory=list)
 
     def image(self, phase: Tensor) -> Tensor:
-        shown = phase + 0.5 * torch.sin(phase)
-        fields = [
-            self.spec.propagator(channel).forward(torch.polar(torch.ones_like(one), one))
-            for channel, one in enumerate(shown)
-        ]
-        return self.spec.region.crop(torch.stack(fields).abs().square())
+        return ideal_image(phase + 0.5 * torch.sin(phase), self.spec)
 
     @property
     def gains(self) -> tuple[float, ...]:

@@ -42,12 +42,6 @@ def test_without_a_simulated_bench_the_refusal_reaches_the_caller(bench, scene):
         Oracle(iterations=1).solve(scene(), Hardware(bench.spec))
 
 
-def test_the_oracle_returns_a_phase_free_of_its_graph(bench, scene):
-    phase = Oracle(iterations=2).solve(scene(), bench)
-    assert not phase.requires_grad
-    assert phase.dtype == torch.float32
-
-
 def test_a_better_phase_of_another_method_is_picked_up_in_the_colour_where_it_is_better(bench, scene):
     target = scene(channels=3)
     short = Oracle(iterations=1, step=1e-6, rounds=1)  # a descent that finds nothing

@@ -38,17 +38,6 @@ def test_the_gradient_equals_autograd(loss, pupil, make_bench, scene):
     assert (gradient - phase.grad).norm() < 1e-10 * gradient.norm()
 
 
-@pytest.mark.parametrize("loss", list(LOSSES))
-def test_the_gradient_equals_finite_differences(loss, make_bench, scene):
-    problem, phase = pair(make_bench, scene, loss)
-    direction = torch.randn(phase.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
-    slope = (problem.evaluate(phase)[1] * direction).sum()
-    # L1 has a kink wherever a pixel is met exactly; MS-SSIM's slope is so small that rounding counts below 1e-6
-    h = {"intensity_l1": 1e-7, "ms_ssim": 1e-6}.get(loss, 1e-5)
-    ahead, behind = (problem.evaluate(phase + sign * h * direction)[0].sum() for sign in (1, -1))
-    assert float((ahead - behind) / (2 * h)) == pytest.approx(float(slope), rel=1e-4)
-
-
 def test_a_phase_of_another_size_is_refused(make_bench, scene):
     problem, phase = pair(make_bench, scene, "intensity_l2")
     for wrong in (phase[..., :-1], phase[..., :1], torch.zeros(1, *problem.model.padded_shape).double()):

@@ -130,7 +130,6 @@ def test_gradient_equals_the_finite_difference(metric: Metric, pair: tuple[Tenso
     step = 1e-3 if metric.name == "lpips_alex" else 1e-6  # the former computes in float32
     variable = image.clone().requires_grad_()
     metric.function(variable, target).backward()
-    assert variable.grad is not None
     direction = variable.grad / variable.grad.norm()
     ahead = float(metric.function((image + step * direction), target))
     behind = float(metric.function((image - step * direction), target))
@@ -145,5 +144,4 @@ def test_gradient_is_finite_for_equal_and_for_black_images(metric: Metric, pair:
     for start, other in ((target, target), (black, target), (black, black)):
         variable = start.clone().requires_grad_()
         metric.function(variable, other).backward()
-        assert variable.grad is not None
         assert bool(variable.grad.isfinite().all())

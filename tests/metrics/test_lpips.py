@@ -93,7 +93,6 @@ def test_without_weights_there_is_a_reason_and_no_number(
 ) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
     reason = available("alex")
-    assert reason is not None
     assert "\n" not in reason
     assert "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth" in reason
     assert lpips_metric("vgg").available() is not None

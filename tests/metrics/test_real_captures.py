@@ -22,7 +22,6 @@ pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the real captures a
 
 def read(name: str) -> Image:
     image = cv2.imread(str(FOLDER / f"{name}.png"))
-    assert image is not None
     return np.asarray(image[..., ::-1], dtype=np.float32) / np.float32(255)
 
 

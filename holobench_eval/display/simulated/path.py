@@ -77,13 +77,17 @@ class OpticalPath:
 
     def to(self, device: torch.device) -> OpticalPath:
         """The same on a device."""
+        return self.changed(lambda factor: factor.to(device))
+
+    def changed(self, change: Callable[[Tensor], Tensor]) -> OpticalPath:
+        """The same with a change of every tensor of its own, the rows of the dust among them."""
         return replace(
             self,
-            rows=self.rows.to(device),
-            columns=self.columns.to(device),
-            transfer=self.transfer.to(device),
-            dust=None if self.dust is None else Dust(self.dust.rows.to(device), self.dust.change.to(device)),
-            last=None if self.last is None else self.last.to(device),
+            rows=change(self.rows),
+            columns=change(self.columns),
+            transfer=change(self.transfer),
+            dust=None if self.dust is None else Dust(change(self.dust.rows), change(self.dust.change)),
+            last=None if self.last is None else change(self.last),
         )
 
     def forward(self, field: Tensor) -> Tensor:
@@ -112,8 +116,7 @@ class OpticalPath:
 
     def adjoint(self, image: Tensor) -> Tensor:
         """The adjoint of ``forward``, ``(finer H, finer W)`` to ``(samples, samples, H, W)``."""
-        padded, height = self.transfer.shape, self.shape[0]
-        rows, columns, transfer, dust, last = self._conjugates
+        padded, height, back = self.transfer.shape, self.shape[0], self._conjugate
         seen = image.new_empty((len(image), padded[1]))
 
         def begin(part: slice) -> None:
@@ -121,19 +124,19 @@ class OpticalPath:
 
         def returning(part: slice) -> Tensor:
             spectrum = finer_adjoint(seen[:, part].T, self.finer, padded[0])
-            return spectrum if last is None else spectrum.mul_(last[:, part].T)
+            return spectrum if back.last is None else spectrum.mul_(back.last[:, part].T)
 
         in_blocks(begin, image, len(image), self.finer * seen.numel())
-        dusty = returning if dust is None else self._through(dust, returning)
-        lines = image.new_empty((len(rows), height, padded[1]))
+        dusty = returning if back.dust is None else self._through(back.dust, returning)
+        lines = image.new_empty((len(back.rows), height, padded[1]))
 
         def leaving(part: slice) -> None:
-            spectrum = dusty(part).mul_(transfer[:, part].T)
-            for line, weights in zip(lines, rows, strict=True):
+            spectrum = dusty(part).mul_(back.transfer[:, part].T)
+            for line, weights in zip(lines, back.rows, strict=True):
                 line[:, part] = torch.fft.ifft(spectrum * weights, norm="forward")[:, :height].T
 
         self._each_column(leaving)
-        return row_adjoint(lines, columns, self.shape[1])
+        return row_adjoint(lines, back.columns, self.shape[1])
 
     def intensity(self, light: Light) -> Tensor:
         """See ``LightPath``."""
@@ -169,15 +172,9 @@ class OpticalPath:
         in_blocks(work, self.transfer, self.transfer.shape[1], self.finer * self.transfer.numel())
 
     @cached_property
-    def _conjugates(self) -> tuple[Tensor, Tensor, Tensor, Dust | None, Tensor | None]:
+    def _conjugate(self) -> OpticalPath:
         """Formed once: a lazy conjugate is formed in every product."""
-        return (
-            conjugate(self.rows),
-            conjugate(self.columns),
-            conjugate(self.transfer),
-            None if self.dust is None else Dust(self.dust.rows, conjugate(self.dust.change)),
-            None if self.last is None else conjugate(self.last),
-        )
+        return self.changed(conjugate)
 
 
 class _Seen(torch.autograd.Function):

@@ -54,22 +54,21 @@ def test_digest_follows_the_file(tmp_path):
         (("pitch: 6.4e-6", "pitch: -1"), r"mine.yaml:\d+:\d+: panel.pitch: -1 is not in 500e-9 to 200e-6 m$"),
         (("pitch: 6.4e-6", "pitch: 6.4"), r"panel.pitch: 6.4 is not in .* m; lengths are in metres: 6.4e-6$"),
         (("distance: 0.1 ", "distance: 100 "), r"panel.distance: 100 is not in .* m; lengths are in metres: 100e-3$"),
-        (
-            ("6.36e-7, 5.17e-7, 4.46e-7", "532"),
-            r"panel.wavelengths\[0\]: 532 is not in .*; lengths are in metres: 532e-9$",
-        ),
+        (("6.36e-7, 5.17e-7, 4.46e-7", "532"), r"wavelengths\[0\]: 532 is not in .*; lengths are in metres: 532e-9$"),
         ((", 4.46e-7]", "]"), r"panel.wavelengths: 2 wavelengths; a display has three, .* or one, for gray pictures$"),
         ((", 4.46e-7]", ", 4e-7, 3e-7]"), r"panel.wavelengths: 4 wavelengths; a display has three"),
-        (
-            ("5.17e-7, 4.46e-7]", "4.46e-7, 5.17e-7]"),
-            r"red comes first, .*: \[6.36e-07, 5.17e-07, 4.46e-07\]$",
-        ),
+        (("5.17e-7, 4.46e-7]", "4.46e-7, 5.17e-7]"), r"red comes first, .*: \[6.36e-07, 5.17e-07, 4.46e-07\]$"),
         (("version: 1\n", ""), "missing key 'version'"),
-        (("version: 1\n", "version: 1\nlut: {bend: 0.25}\n"), ":4:13: 0.25 bends some exponents to zero"),
+        (("", "lut: {bend: 0.25}\n"), ":4:13: 0.25 bends some exponents to zero"),
+        (("", "spectrum: {measured: [[[0, 1]]]}\n"), ":4:22: there are 1 measured spectra; the panel has 3"),
+        (("", "spectrum: {measured: [[[-7e-7, 1]]]}\n"), r":4:2.: spectrum\.measured\[0\].* should be .* than"),
+        (("", "spectrum: {width: [1e-3, 0, 0]}\n"), r":4:2.: spectrum\.width\[0\].* should be .* than or equal to"),
     ],
 )
 def test_a_fault_in_a_profile_is_one_line_with_its_place(tmp_path, change, message):
     text = (PROFILES / "ideal.yaml").read_text()
+    if not change[0]:
+        change = ("version: 1\n", f"version: 1\n{change[1]}")
     assert change[0] in text
     (tmp_path / "mine.yaml").write_text(text.replace(*change))
     with pytest.raises(UserError, match=message) as caught:

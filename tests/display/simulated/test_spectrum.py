@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
-from pathlib import Path
 
 import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval.core.errors import UserError
-from holobench_eval.display import Profile, load_profile
+from holobench_eval.display import Profile
 from holobench_eval.display.simulated.geometry import Geometry
 from holobench_eval.display.simulated.ground_truth import truth
 from holobench_eval.display.simulated.pipeline import SimulatedBench
@@ -109,14 +106,6 @@ def test_the_effect_is_listed_with_its_width_and_what_the_blaze_makes_of_it(idea
     assert f"{1e-9 * 0.1 * 0.25 / 6.4e-6**2:.2g} px" in text
 
 
-def test_a_spectrum_for_too_few_colours_is_refused_with_its_place(tmp_path: Path) -> None:
-    ideal = files("holobench_eval.display.simulated") / "profiles" / "ideal.yaml"
-    file = tmp_path / "mine.yaml"
-    file.write_text(ideal.read_text() + "\nspectrum: {measured: [[[0.0, 1.0]]]}\n")
-    with pytest.raises(UserError, match=r"mine.yaml:\d+:\d+: there are 1 measured spectra; the panel has 3"):
-        load_profile(str(file))
-
-
 def test_all_lines_meet_the_same_hologram_of_an_added_lens(ideal: Profile, geometry: Geometry) -> None:
     ((_, long),) = measured((2e-8, 1.0)).spectrum(geometry)
     lens = AddedLens(move=(0.1, 0.1, 0.0))
@@ -129,14 +118,3 @@ def test_the_light_that_the_ground_truth_states_is_that_of_all_lines(ideal: Prof
         return [estimate.value for estimate in truth(bench) if estimate.name == "light"]
 
     assert light(Spectrum(width=(2e-9,) * 3, lines=5)) == pytest.approx(light(Spectrum()), rel=1e-6)
-
-
-@pytest.mark.parametrize("spectrum", ["{measured: [[[-7e-7, 1]], [[0, 1]], [[0, 1]]]}", "{width: [1e-3, 0, 0]}"])
-def test_a_spectrum_far_from_its_colour_is_refused(spectrum: str, tmp_path: Path) -> None:
-    ideal = files("holobench_eval.display.simulated") / "profiles" / "ideal.yaml"
-    file = tmp_path / "mine.yaml"
-    file.write_text(ideal.read_text() + f"\nspectrum: {spectrum}\n")
-    with pytest.raises(
-        UserError, match=r"mine.yaml:18:2.: spectrum\.(measured|width)\[0\].* should be .* than or equal to"
-    ):
-        load_profile(str(file))

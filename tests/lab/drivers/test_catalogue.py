@@ -23,6 +23,7 @@ from holobench_eval.lab.drivers.catalogue import (
 )
 
 MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
+OPENCV = {"device": 0, "resolution": [64, 48]}
 
 
 def test_importing_the_drivers_imports_none_of_their_packages() -> None:
@@ -37,31 +38,16 @@ def test_importing_the_drivers_imports_none_of_their_packages() -> None:
     [
         ("slm", "moniter", {}, "unknown slm driver 'moniter'; did you mean 'monitor'. allowed: monitor, slmsuite"),
         ("camera", "gphoto", {}, "unknown camera driver 'gphoto'; did you mean 'gphoto2'"),
-        (
-            "slm",
-            "monitor",
-            {**MONITOR, "index": 1},
-            "slm driver 'monitor' has no parameter 'index'; allowed: check, name",
-        ),
+        ("slm", "monitor", {**MONITOR, "index": 1}, "driver 'monitor' has no parameter 'index'; allowed: check, name"),
         ("slm", "monitor", {"name": "HDMI-1"}, "slm driver 'monitor' needs the parameter 'resolution'"),
-        (
-            "slm",
-            "monitor",
-            {**MONITOR, "resolution": [1920]},
-            "slm driver 'monitor' needs the parameter 'resolution.1'",
-        ),
+        ("slm", "monitor", {**MONITOR, "resolution": [1920]}, "'monitor' needs the parameter 'resolution.1'"),
         ("slm", "monitor", {**MONITOR, "resolution": [0, 1080]}, "parameter 'resolution.0': .* got 0"),
         ("slm", "monitor", {**MONITOR, "check": "no"}, "parameter 'check': .* got 'no'"),
         ("slm", "monitor", {**MONITOR, "name": 1}, "parameter 'name': .*string, got 1"),
         ("slm", "monitor", {**MONITOR, "name": {1, 2}}, "slm driver 'monitor': .*set"),
-        ("camera", "opencv", {"device": 0, "resolution": [64, 48], "exposures": [1, float("nan")]}, "exposures.1"),
-        ("camera", "opencv", {"device": 0, "resolution": [64, 48], "exposures": [1, 0.1]}, "shortest and the longest"),
-        (
-            "camera",
-            "opencv",
-            {"device": 0, "resolution": [64, 48], "exposures": [0.1, 1], "bits": 12},
-            "GREY has 8 bits",
-        ),
+        ("camera", "opencv", {**OPENCV, "exposures": [1, float("nan")]}, "exposures.1"),
+        ("camera", "opencv", {**OPENCV, "exposures": [1, 0.1]}, "shortest and the longest"),
+        ("camera", "opencv", {**OPENCV, "exposures": [0.1, 1], "bits": 12}, "GREY has 8 bits"),
         ("camera", "micromanager", {"config": ""}, "parameter 'config'"),
         ("camera", "gphoto2", {"iso": 100}, "parameter 'iso': .*string, got 100"),
     ],

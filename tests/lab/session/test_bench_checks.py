@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
-from holobench_eval.core.errors import UserError
+from holobench_eval.lab.session.manifest import CHECKS, read_manifest
+from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
 STUDY = """\
@@ -25,31 +23,20 @@ LATER = ("leto-mild", (144, 144), 5)  # another noise
 
 
 @pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("checks")
-    (folder / "study.yaml").write_text(STUDY)
-    done = CliRunner().invoke(app, ["session", "export", str(folder / "study.yaml"), str(folder / "bench")])
-    assert done.exit_code == 0, (done.output, done.exception)
-    Lab(*LAB).photograph_round(folder / "bench", 1)
-    return folder / "bench"
+def photographed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = exported(tmp_path_factory.mktemp("checks"), STUDY)
+    Lab(*LAB).photograph_round(folder, 1)
+    return folder
 
 
 @pytest.fixture
-def session(exported: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(exported, tmp_path / "bench"))
-
-
-def imported(folder: Path) -> tuple[str, str]:
-    """What an import says, and the line with which it ends."""
-    done = CliRunner().invoke(app, ["session", "import", str(folder)])
-    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
-    assert "\n" not in str(done.exception)
-    return done.output, str(done.exception or "")
+def session(photographed: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(photographed, tmp_path / "bench"))
 
 
 def test_checks_that_pass_are_a_line_each_in_the_import_and_in_the_report(session: Path) -> None:
     Lab(*LATER).photograph_checks(session)
-    said, failure = imported(session)
+    said, failure = told("import", session)
     assert not failure
     lines = [line for line in said.splitlines() if "linearity:" in line or "phase convention:" in line]
     assert [line.split(":")[0] for line in lines] == ["channel 0", "channel 1", "channel 2", "phase convention"]
@@ -60,43 +47,35 @@ def test_checks_that_pass_are_a_line_each_in_the_import_and_in_the_report(sessio
 
 def test_a_reversed_sign_is_named_before_anything_is_scored(session: Path) -> None:
     Lab(*LATER, sign=-1).photograph_checks(session)
-    _, failure = imported(session)
+    _, failure = told("import", session)
     assert "nothing was scored" in failure
     assert "set phase.sign: -1" in failure
 
 
 def test_a_camera_that_is_not_linear_is_refused_and_its_checks_may_be_photographed_again(session: Path) -> None:
     Lab(*LATER).photograph_checks(session, gamma=0.8)
-    _, failure = imported(session)
+    _, failure = told("import", session)
     assert "linearity: r^2" in failure
     assert "is there gamma" in failure
     Lab(*LATER).photograph_checks(session)
-    assert not imported(session)[1]
+    assert not told("import", session)[1]
 
 
 def test_checks_that_were_left_out_are_told_and_a_part_of_them_is_refused(session: Path) -> None:
-    said, failure = imported(session)
+    said, failure = told("import", session)
     assert not failure
     assert "checks: not photographed" in said
     Lab(*LATER).photograph_checks(session)
     next((session / "captures" / "checks").glob("*.png")).unlink()
-    assert "checks: nothing was scored. missing: captures/checks/" in imported(session)[1]
+    assert "checks: nothing was scored. missing: captures/checks/" in told("import", session)[1]
 
 
 def test_a_camera_with_one_exposure_checks_the_sign_alone(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(STUDY)
-    done = CliRunner().invoke(
-        app, ["session", "export", str(tmp_path / "study.yaml"), str(tmp_path / "bench"), "--fixed-exposure"]
-    )
-    assert done.exit_code == 0
-    patterns = json.loads((tmp_path / "bench" / "manifest.json").read_text())["patterns"]
-    assert [each["role"] for each in patterns if each["round"] == 0] == [
-        *["dark"] * 3,
-        *["letter"] * 3,
-        *["reversed"] * 3,
-    ]
-    Lab(*LATER).photograph_checks(tmp_path / "bench")
-    said, failure = imported(tmp_path / "bench")
+    folder = exported(tmp_path, STUDY, "--fixed-exposure")
+    roles = [each.role for each in read_manifest(folder).of_round(CHECKS)]
+    assert roles == [role for role in ("dark", "letter", "reversed") for _ in range(3)]
+    Lab(*LATER).photograph_checks(folder)
+    said, failure = told("import", folder)
     assert "linearity: not checked, since the session has one exposure" in said
     assert "phase convention:" in said
     assert "none of the" in failure

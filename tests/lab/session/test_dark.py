@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
-from typer.testing import CliRunner
 
 import holobench_eval.display.simulated.profile as profiles
-from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session.folder import FolderPhotographer
 from holobench_eval.lab.session.manifest import CHECKS
+from tests.lab.session.running import exported, told
 from tests.lab.session.test_bench_checks import LAB, STUDY
 from tests.support.photographing import Lab
 
@@ -23,27 +22,20 @@ DARK = 900  # of the lab
 
 @pytest.mark.parametrize("kind", ["level", "file", "file of the bench"])
 def test_given_dark_counts_stand_for_dark_frames(tmp_path: Path, kind: str) -> None:
-    (tmp_path / "study.yaml").write_text(STUDY)
-    lab, folder, given = Lab(*LAB, dark=DARK), tmp_path / "bench", str(DARK)
+    lab, given = Lab(*LAB, dark=DARK), str(DARK)
     if kind != "level":
         given = str(tmp_path / "my dark.npy")
         np.save(given, np.full(lab.bench.response.shape[-2:], DARK, np.float32))
-    export = ["session", "export", str(tmp_path / "study.yaml"), str(folder), "--dark", given]
+    options = ("--dark", given)
     if kind == "file of the bench":
-        panel = yaml.safe_load(PROFILE.read_text())["panel"] | {"shape": [144, 144]}
-        capture = {"dark_frames": 0, "dark": "my dark.npy"}
-        described = {"name": "leto-mild", "version": 1, "panel": panel, "capture": capture}
-        (tmp_path / "bench.yaml").write_text(yaml.safe_dump(described))
-        export[-2:] = ["--bench", str(tmp_path / "bench.yaml")]
-    done = CliRunner().invoke(app, export)
-    assert done.exit_code == 0, (done.output, done.exception)
+        options = described(tmp_path, capture={"dark_frames": 0, "dark": "my dark.npy"})
+    folder = exported(tmp_path, STUDY, *options)
     for name in ("round-1", "checks"):
         rows = list(csv.DictReader((folder / "patterns" / name / "order.csv").read_text().splitlines()))
         assert {row["laser"] for row in rows} == {"on"}
     lab.photograph_round(folder, 1)
     if kind != "file of the bench":  # whose optics are not those of the small lab
-        done = CliRunner().invoke(app, ["session", "import", str(folder)])
-        assert done.exit_code == 0, (done.output, done.exception)
+        assert not told("import", folder)[1]
     photographer = FolderPhotographer(folder)
     pattern = photographer.manifest.of_round(1)[0]
     light, counts = photographer.light(pattern), photographer.counts(pattern)
@@ -55,22 +47,20 @@ def test_given_dark_counts_stand_for_dark_frames(tmp_path: Path, kind: str) -> N
             FolderPhotographer(folder).light(pattern)
 
 
-def described(folder: Path, **bench: object) -> list[str]:
-    """The words of an export with a bench file."""
-    (folder / "study.yaml").write_text(STUDY)
+def described(folder: Path, **bench: object) -> tuple[str, Path]:
+    """The options of an export with a bench file."""
     panel = yaml.safe_load(PROFILE.read_text())["panel"] | {"shape": [144, 144]}
     (folder / "dark.yaml").write_text(yaml.safe_dump({"name": "lab", "version": 1, "panel": panel, **bench}))
-    return ["session", "export", str(folder / "study.yaml"), str(folder / "out"), "--bench", str(folder / "dark.yaml")]
+    return "--bench", folder / "dark.yaml"
 
 
 def test_given_dark_counts_go_before_those_of_the_bench_file_whatever_the_files_are_called(tmp_path: Path) -> None:
     for name, level in (("dark.npy", 64), ("new/dark.npy", 80)):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         np.save(tmp_path / name, np.full((100, 100), level, np.uint16))
-    words = described(tmp_path, capture={"dark_frames": 0, "dark": "dark.npy"})
-    done = CliRunner().invoke(app, [*words, "--dark", str(tmp_path / "new" / "dark.npy")])
-    assert done.exit_code == 0, (done.output, done.exception)
-    assert FolderPhotographer(tmp_path / "out").dark_of(1, 0).bias.mean() == 80
+    options = described(tmp_path, capture={"dark_frames": 0, "dark": "dark.npy"})
+    folder = exported(tmp_path, STUDY, *options, "--dark", tmp_path / "new" / "dark.npy")
+    assert FolderPhotographer(folder).dark_of(1, 0).bias.mean() == 80
 
 
 @pytest.mark.parametrize(
@@ -85,12 +75,11 @@ def test_photographs_on_another_scale_than_the_given_dark_counts_are_a_fault(
     tmp_path: Path, ending: str, dark: np.generic, line: str
 ) -> None:
     np.save(tmp_path / "dark.npy", np.full((100, 100), dark))
-    done = CliRunner().invoke(app, [*described(tmp_path), "--dark", str(tmp_path / "dark.npy")])
-    assert done.exit_code == 0, (done.output, done.exception)
-    photographer, draw = FolderPhotographer(tmp_path / "out"), np.random.default_rng(0)
+    folder = exported(tmp_path, STUDY, *described(tmp_path), "--dark", tmp_path / "dark.npy")
+    photographer, draw = FolderPhotographer(folder), np.random.default_rng(0)
     for pattern in photographer.manifest.of_round(CHECKS):
         counts = draw.integers(0, 250, (100, 100)).astype(np.uint16) * (1 if ending == ".jpg" else 256)
         picture = Image.fromarray(counts.astype(np.uint8) if ending == ".jpg" else counts)
-        picture.save(tmp_path / "out" / f"{pattern.capture}{ending}")
+        picture.save(folder / f"{pattern.capture}{ending}")
     faults, _ = photographer.check_round(CHECKS)
     assert any(line in fault for fault in faults), faults

@@ -9,12 +9,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.session import read_manifest
+from tests.lab.session.running import told
 
 STUDY = """\
 title: Patterns
@@ -36,9 +35,7 @@ def exported(folder: Path, bench: str, session: str = "session") -> tuple[Path, 
     (folder / "study.yaml").write_text(STUDY)
     (folder / "bench.yaml").write_text(bench)
     cv2.imwrite(str(folder / "flat.bmp"), FLAT)
-    done = CliRunner().invoke(app, ["session", "export", str(folder / "study.yaml"), str(folder / session)])
-    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
-    return folder / session, f"{done.output} {done.exception or ''}"
+    return folder / session, " ".join(told("export", folder / "study.yaml", folder / session))
 
 
 def test_patterns_have_a_full_turn_for_each_laser_and_the_map_which_travels_with_them(tmp_path: Path) -> None:
@@ -71,10 +68,7 @@ def test_a_changed_map_is_another_bench(tmp_path: Path) -> None:
     [
         ("{two_pi_level: [311, 256]}", "bench.yaml:4:8: phase: two_pi_level: 2 levels for 3 colours"),
         ("{two_pi_level: [311, 0, 256]}", "bench.yaml:4:29: phase.two_pi_level[1]: 0 is no level of a full turn"),
-        (
-            "{two_pi_level: [2.1, 1.9, 1.7]}",
-            "phase.two_pi_level[0]: 2.1 is no level of a full turn; expected 8 to 65536",
-        ),
+        ("{two_pi_level: [2.1, 1.9, 1.7]}", "two_pi_level[0]: 2.1 is no level of a full turn; expected 8 to 65536"),
         (
             "{correction: {file: flat.bmp, two_pi_level: 8}}",
             "levels from 0 to 255, which are 32 turns; set correction.two_pi_level to the level of this uint8 map",

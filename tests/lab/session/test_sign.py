@@ -6,11 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
-from holobench_eval.core.errors import UserError
 from holobench_eval.display.simulated.pipeline import SimulatedBench
+from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
 STUDY = """\
@@ -24,14 +22,9 @@ protocol: {{metrics: [psnr]}}
 
 def refused(folder: Path, profile: str, lab: Lab) -> str:
     """The one line with which the import of photographs from a lab ends."""
-    (folder / "study.yaml").write_text(STUDY.format(profile=profile))
-    session = folder / "bench"
-    assert CliRunner().invoke(app, ["session", "export", str(folder / "study.yaml"), str(session)]).exit_code == 0
+    session = exported(folder, STUDY.format(profile=profile))
     lab.photograph_round(session, 1)
-    done = CliRunner().invoke(app, ["session", "import", str(session)])
-    assert isinstance(done.exception, UserError), done.output
-    assert "\n" not in str(done.exception)
-    return str(done.exception)
+    return told("import", session)[1]
 
 
 @pytest.mark.parametrize("profile", ["leto-mild", "leto-aged"])

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
-from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session import Pattern, read_manifest
 from holobench_eval.lab.session.checks import check_swaps, grain
+from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
 STUDY = """\
@@ -36,21 +34,13 @@ class Session:
 
 @pytest.fixture(scope="module", params=["leto-2020", "leto-aged"])
 def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Session:
-    folder = tmp_path_factory.mktemp(request.param)
-    (folder / "study.yaml").write_text(STUDY.format(profile=request.param))
-    done = CliRunner().invoke(app, ["session", "export", str(folder / "study.yaml"), str(folder / "bench")])
-    assert done.exit_code == 0, (done.output, done.exception)
-    Lab(request.param, (144, 144), seed=5).photograph_round(folder / "bench", 1)
-    holograms = [pattern for pattern in read_manifest(folder / "bench").patterns if pattern.target]
+    folder = exported(tmp_path_factory.mktemp(request.param), STUDY.format(profile=request.param))
+    Lab(request.param, (144, 144), seed=5).photograph_round(folder, 1)
+    holograms = [pattern for pattern in read_manifest(folder).patterns if pattern.target]
     groups: dict[tuple[str, int], list[Pattern]] = {}
     for pattern in holograms:
         groups.setdefault((pattern.target, pattern.colour), []).append(pattern)
-    return Session(folder / "bench", list(groups.values()))
-
-
-def run_import(folder: Path) -> tuple[str, str]:
-    done = CliRunner().invoke(app, ["session", "import", str(folder)])
-    return done.output, str(done.exception) if isinstance(done.exception, UserError) else ""
+    return Session(folder, list(groups.values()))
 
 
 def swap(first: Path, second: Path) -> None:
@@ -66,12 +56,11 @@ def test_each_swap_of_two_methods_is_named_in_one_line_and_no_honest_pair_is(ses
         first, second = pairs[4 * index][index]
         paths = [session.folder / f"{pattern.capture}.png" for pattern in (first, second)]
         swap(*paths)
-        said, line = run_import(session.folder)
+        said, line = told("import", session.folder)
         swap(*paths)
         assert f"wrong order: {first.capture} and {second.capture}, of one target, changed places" in line, said
         assert line.count("wrong order") == 1
-        assert "\n" not in line
-    said, line = run_import(session.folder)
+    said, line = told("import", session.folder)
     assert not line
     assert "table.csv" in said
     assert "wrong order" not in said

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import DisplaySpec
+from holobench_eval.display.api import ideal_image
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import Crosstalk, LookUpTable
 from holobench_eval.methods.calibrated.display_model import KNOTS, DisplayModel
@@ -37,15 +37,10 @@ def unexplained(bench: SimulatedBench, model: DisplayModel) -> tuple[float, floa
     phase = smooth_phase()
     with torch.no_grad():
         seen = bench.spec.region.crop(bench.image(phase))
-        images = model(phase).abs().square(), ideal_image(bench.spec, phase)
+        images = model(phase).abs().square(), ideal_image(phase, bench.spec)
     return tuple(
         float(1 - (image * seen).sum() ** 2 / (image.square().sum() * seen.square().sum())) for image in images
     )
-
-
-def ideal_image(spec: DisplaySpec, phase: Tensor) -> Tensor:
-    fields = [spec.propagator(c).forward(torch.polar(torch.ones_like(one), one)) for c, one in enumerate(phase)]
-    return spec.region.crop(torch.stack(fields)).abs().square()
 
 
 @pytest.mark.parametrize("blaze", [(0.0, 0.0), (0.0, 0.25), (0.2, 0.0)])

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval.display.api import DisplaySpec, white_irradiance
+from holobench_eval.display.api import DisplaySpec, ideal_image, white_irradiance
 from holobench_eval.methods.calibrated.approximator import ModelApproximator
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel
@@ -29,17 +29,12 @@ def a_phase(spec: DisplaySpec, seed: int = 0) -> Tensor:
     return random_phase(len(spec.wavelengths), spec.shape, 3.0, torch.Generator().manual_seed(seed))
 
 
-def ideal(spec: DisplaySpec, phase: Tensor) -> Tensor:
-    fields = [spec.propagator(c).forward(torch.polar(torch.ones_like(one), one)) for c, one in enumerate(phase)]
-    return spec.region.crop(torch.stack(fields)).abs().square()
-
-
 @pytest.mark.parametrize("method", [LearnedKernel(), CNNPropCNN(width=4)])
 @pytest.mark.parametrize("pupil", [None, 0.8])
 def test_an_untrained_model_is_the_ideal_display(method: LearnedKernel | CNNPropCNN, pupil: float | None) -> None:
     spec = replace(SPEC, pupil=pupil)
     shown = method.approximator(spec).image(LIGHT)(a_phase(spec))
-    assert torch.allclose(shown, ideal(spec, a_phase(spec)) / LIGHT[:, None, None], atol=1e-4)
+    assert torch.allclose(shown, ideal_image(a_phase(spec), spec) / LIGHT[:, None, None], atol=1e-4)
 
 
 def test_an_untrained_hybrid_is_the_untrained_parametric_model() -> None:

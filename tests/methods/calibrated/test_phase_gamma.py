@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import BudgetError
-from holobench_eval.display.api import Capture
+from holobench_eval.display.api import Capture, ideal_image
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.phase_gamma import WirtingerGamma, curved
 from holobench_eval.methods.wirtinger import Wirtinger
@@ -32,11 +32,7 @@ class LutDisplay(BentDisplay):
 
     def capture(self, phase: Tensor) -> Capture:
         self.fate.meets("photograph")
-        shown = curved(phase, self.exponent)
-        fields = [
-            self.spec.propagator(c).forward(torch.polar(torch.ones_like(one), one)) for c, one in enumerate(shown)
-        ]
-        frame = self.spec.region.crop(torch.stack(fields)).abs().square()
+        frame = ideal_image(curved(phase, self.exponent), self.spec)
         return Capture(frame, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
 
 

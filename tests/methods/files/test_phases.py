@@ -127,9 +127,8 @@ def test_a_picture_of_what_a_bench_shows_is_the_phase_to_half_a_level(tmp_path: 
     correction = {"file": str(tmp_path / "flat.bmp"), "two_pi_level": [210, 180, 150]}
     found = solved(tmp_path / "levels.png", **shared, correction=correction)
     for channel, level in enumerate(full):
-        assert (
-            turns_apart(found[channel], PHASE[channel]) < 0.75 / level
-        )  # where two pi is between two levels, and half
+        # where two pi is between two levels, and half
+        assert turns_apart(found[channel], PHASE[channel]) < 0.75 / level
 
 
 def test_a_correction_map_is_one_of_the_files_of_a_target(tmp_path: Path) -> None:
@@ -187,9 +186,8 @@ def wrong_files(folder: Path) -> None:
     (folder / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400))
     (folder / "noise.mat").write_bytes(bytes(range(200)))
     savemat(folder / "crash.mat", {"phases": PHASE})
-    values = (9).to_bytes(4, "little") + PHASE.nbytes.to_bytes(
-        4, "little"
-    )  # double precision, and how many bytes follow
+    # double precision, and how many bytes follow
+    values = (9).to_bytes(4, "little") + PHASE.nbytes.to_bytes(4, "little")
     crash = (folder / "crash.mat").read_bytes()
     assert crash.count(values) == 1
     (folder / "crash.mat").write_bytes(crash.replace(values, (200).to_bytes(4, "little") + values[4:]))
@@ -221,26 +219,14 @@ def wrong_files(folder: Path) -> None:
         ("gone.npy", {}, "gone.npy: no such file"),
         ("small.npy", {}, r"3 x 11 x 12 values of type float64; 'small' shows 12 x 12 in 3 colours"),
         ("int.npy", {}, "say which level is a full turn: two_pi_level"),
-        (
-            "float.npy",
-            {},
-            "float64, but whole numbers up to 25[0-9], so levels, not radians; set 'levels: all' and two_pi",
-        ),
+        ("float.npy", {}, "but whole numbers up to 25[0-9], so levels, not radians; set 'levels: all' and two_pi"),
         ("float.npy", {"sign": -1, "origin": 1.0}, r"\(radians that are whole: store them modulo 2 pi\)"),
         ("float.npy", {"two_pi_level": 256}, "two_pi_level is set, but float64 holds radians; levels need"),
-        (
-            "float.npy",
-            {"correction": {"file": "FOLDER/byte.npy"}},
-            "correction is set, but float64 holds radians; levels need",
-        ),
+        ("float.npy", {"correction": {"file": "FOLDER/byte.npy"}}, "correction is set, but float64 holds radians"),
         ("complex.npy", {"two_pi_level": 256}, "two_pi_level is set, but complex128 holds a field, not levels"),
         ("byte.npy", {"two_pi_level": [256, 250]}, "two_pi_level: 2 levels for 3 colours; expected one for all, or"),
         ("byte.npy", {"correction": {"file": "gone.bmp"}}, "gone.bmp: no such file"),
-        (
-            "byte.npy",
-            {"correction": {"file": "FOLDER/small.npy"}},
-            "correction of 3 x 11 x 12 levels; .* 12 x 12 pixels",
-        ),
+        ("byte.npy", {"correction": {"file": "FOLDER/small.npy"}}, "of 3 x 11 x 12 levels; .* 12 x 12 pixels"),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),
         ("text.npy", {}, "holds 1 values of type <U5; expected numbers"),
@@ -302,15 +288,9 @@ def test_a_reader_that_crashes_or_does_not_end_is_one_line(
         ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\} and \{channel\} do"),
         ({"file": "phases/{target}.jpg"}, "should end in .png"),
         ({"file": "{target}.npy", "amplitude": "{channel}.npy"}, "in both patterns or in none"),
-        (
-            {"two_pi_level": 6.28},
-            r"'two_pi_level': 6.28 is no level of a full turn; expected 8 to .* \(of a panel that",
-        ),
+        ({"two_pi_level": 6.28}, r"'two_pi_level': 6.28 is no level of a full turn; expected 8 to .* \(of a panel"),
         ({"two_pi_level": [256, 0, 256]}, "'two_pi_level.1': 0 is no level of a full turn"),
-        (
-            {"correction": {"file": "a.png", "two_pi_level": 1}},
-            "'correction.two_pi_level': 1 is no level of a full turn",
-        ),
+        ({"correction": {"file": "a.png", "two_pi_level": 1}}, "'correction.two_pi_level': 1 is no level of a full"),
     ],
 )
 def test_wrong_parameters_are_refused_in_one_line(params: dict[str, Any], message: str) -> None:

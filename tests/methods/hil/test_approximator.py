@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.display.api import DisplaySpec, white_irradiance
+from holobench_eval.display.api import DisplaySpec, ideal_image, white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss, LearningRates
 from holobench_eval.methods.hil.critic import Critic
@@ -54,11 +54,7 @@ def test_the_input_is_the_ideal_intensity_in_the_unit_of_the_target(optics: dict
     (phase,) = phases()
     light = torch.tensor([1.0, 2.0, 4.0])
     ideal = approximator(spec=spec).ideal(phase, light)
-    for channel, one in enumerate(phase):
-        field = spec.propagator(channel).forward(torch.polar(torch.ones_like(one), one))
-        expected = spec.region.crop(field).abs().square() / light[channel]
-        assert torch.allclose(ideal[0, channel], expected, atol=1e-5)
-    assert ideal.shape == (1, 3, *spec.region.shape)
+    assert torch.allclose(ideal, (ideal_image(phase, spec) / light.view(3, 1, 1))[None], atol=1e-5)
 
 
 def test_a_hologram_that_gives_all_its_light_to_a_target_is_as_bright_as_it() -> None:
@@ -168,7 +164,6 @@ def test_a_frozen_display_is_differentiable_in_the_phase_alone(kind: str) -> Non
     one, (sample,) = made(kind), samples(1)
     phase = sample.phase.clone().requires_grad_()
     one.image(sample.light)(phase).square().sum().backward()
-    assert phase.grad is not None
     assert phase.grad.isfinite().all()
     assert phase.grad.abs().max() > 0
     network = one.trainer.generator if kind == "network" else one.network
@@ -233,23 +228,16 @@ def test_the_parameters_of_another_display_are_refused_in_one_line() -> None:
     refuses(HILPlus(network=SMALL, seed=0).approximator(SPEC).load_learned, alone)
 
 
-def test_the_residual_network_starts_at_nothing() -> None:
-    one, (sample,) = HILPlus(network=SMALL, seed=0).approximator(SPEC), samples(1)
-    alone = HILPlus().approximator(SPEC)
-    views = [each.image(sample.light)(sample.phase).detach() for each in (one, alone)]
-    assert torch.equal(*views)
-    one.step(sample, 0.0)
-    one.step(sample, 0.0)
-    assert one.network is not None
-    assert any(value.grad is not None and value.grad.abs().max() > 0 for value in one.network.parameters())
-
-
-def test_the_residual_of_a_network_that_ends_in_a_transposed_convolution_starts_at_nothing() -> None:
+@pytest.mark.parametrize("network", [SMALL, Network(levels=2, width=4, full_resolution_stage=False)])
+def test_the_residual_network_starts_at_nothing_and_learns(network: Network) -> None:
+    """The second ends in a transposed convolution."""
     (sample,) = samples(1)
-    ends_so = Network(levels=2, width=4, full_resolution_stage=False)
-    one, alone = (HILPlus(network=wanted, seed=0).approximator(SPEC) for wanted in (ends_so, None))
+    one, alone = (HILPlus(network=wanted, seed=0).approximator(SPEC) for wanted in (network, None))
     views = [each.image(sample.light)(sample.phase).detach() for each in (one, alone)]
     assert torch.equal(*views)
+    one.step(sample, 0.0)
+    one.step(sample, 0.0)
+    assert any(value.grad is not None and value.grad.abs().max() > 0 for value in one.network.parameters())
 
 
 @pytest.mark.parametrize("network", [Network(levels=4, width=4, dropout=True), Network("pix2pix", levels=2, width=4)])
@@ -280,7 +268,6 @@ def test_the_critic_learns_to_tell_targets_from_noise() -> None:
 def test_the_critic_is_shown_predictions_as_bright_as_their_targets(monkeypatch: pytest.MonkeyPatch) -> None:
     one, (sample,) = approximator(), samples(1)
     seen: list[tuple[Tensor, Tensor]] = []
-    assert one.critic is not None
 
     def step(picture: Tensor, target: Tensor) -> float:
         seen.append((picture, target))

@@ -1,10 +1,13 @@
+from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
 import torch
 
+from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.online.camera import OnlineCamera
+from holobench_eval.methods.online.network import OnlineCameraNetwork
 from holobench_eval.methods.online.start import Camera, CameraStart, captured_error
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
 from holobench_eval.testing.contract import check_method
@@ -12,10 +15,19 @@ from tests.support.toy_camera import SPEC, Plug, ToyDisplay, picture
 
 FAULTY = {"aberration": 0.6, "unmodulated": 0.3}
 QUICK = CameraStart(converged=Wirtinger(iterations=60))
+TINY = Network(levels=2, width=4)
 
 
-def solved(display, target, budget=None, **params):
-    method = OnlineCamera(start=QUICK, **params)
+@dataclass(frozen=True)
+class WithNetwork(OnlineCameraNetwork):
+    """With a small network, trained in few steps."""
+
+    network: Network = TINY
+    steps: int = 2
+
+
+def solved(display, target, budget=None, of=OnlineCamera, **params):
+    method = of(start=QUICK, **params)
     handle = display.handle(method, target, budget)
     return method.solve(target[None], handle)[0], handle
 
@@ -81,10 +93,13 @@ def test_a_batch_shares_the_budget():
     assert handle.captures == 40
 
 
-@pytest.mark.parametrize("at", [0, 1, 5, 12, 30, 39])
-def test_a_display_that_ends_the_captures_has_a_hologram_as_good_as_the_nominal_one(at):
+ENDS = {OnlineCamera: (0, 1, 5, 12, 30, 39), WithNetwork: (0, 1, 9, 14, 30)}
+
+
+@pytest.mark.parametrize(("of", "at"), [(of, at) for of, ends in ENDS.items() for at in ends])
+def test_a_display_that_ends_the_captures_has_a_hologram_as_good_as_the_nominal_one(of, at):
     display, target = ToyDisplay(**FAULTY), picture()
-    method = OnlineCamera(start=QUICK, captures=40)
+    method = of(start=QUICK, captures=40)
     plug = Plug(display.handle(method, target), at)
     with pytest.raises(Exception, match="plug pulled"):
         method.solve(target[None], plug)
@@ -158,5 +173,6 @@ def test_the_captured_error_is_the_one_that_is_scored():
     assert torch.allclose(captured_error(bright, target), wanted)
 
 
-def test_it_keeps_the_contract_of_methods():
-    check_method(OnlineCamera(captures=16, start=CameraStart(converged=Wirtinger(iterations=12), offsets=2)))
+@pytest.mark.parametrize("of", [OnlineCamera, WithNetwork])
+def test_it_keeps_the_contract_of_methods(of):
+    check_method(of(captures=20, start=CameraStart(converged=Wirtinger(iterations=12), offsets=2)))

@@ -26,18 +26,6 @@ def test_a_peer_keeps_the_contract_of_methods(name):
 
 
 @pytest.mark.parametrize("name", PEERS)
-def test_an_image_does_not_depend_on_its_batch(name, bench, scene):
-    method, target = plugins.build("methods", name, {"iterations": 3}), scene(batch=2)
-    apart = torch.cat([method.solve(target[i : i + 1], bench) for i in range(2)])
-    assert torch.equal(method.solve(target, bench), apart)
-
-
-@pytest.mark.parametrize("name", PEERS)
-def test_a_black_channel_gives_a_finite_phase(name, bench, scene):
-    assert plugins.build("methods", name, {"iterations": 3}).solve(0 * scene(), bench).isfinite().all()
-
-
-@pytest.mark.parametrize("name", PEERS)
 def test_the_global_random_numbers_are_left_as_they_were(name, bench, scene):
     torch.manual_seed(1)
     before = torch.get_rng_state()

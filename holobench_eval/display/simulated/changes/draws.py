@@ -10,6 +10,7 @@ import torch
 from ....core.seeds import generator, seed
 from ....optics.phase import TAU
 from ..profile import Profile
+from .kind import within
 
 STAGES = (
     *("seed", "sampling", "lut", "crosstalk", "aperture", "flicker", "illumination", "coherent_noise", "propagation"),
@@ -20,6 +21,7 @@ MODEL = (
     "is public of the panel stay"
 )
 
+Put = Callable[[Profile, float], Profile]
 LASER = 5e-9  # m: the widest line of a laser diode
 WIDE = 0.8  # of the band: the iris that ranges of aberrations are given for
 
@@ -36,91 +38,57 @@ class Parameter:
     low: float
     high: float
     source: str
-    put: Callable[[Profile, float], Profile]
+    put: Put
+
+
+def _of(stage: str, key: str) -> Put:
+    """A parameter of a stage as it is drawn."""
+    return lambda profile, value: within(profile, stage, **{key: value})
 
 
 def _gamma(profile: Profile, value: float) -> Profile:
-    return replace(profile, lut=replace(profile.lut, gamma=(value, value, value), table=()))
+    return within(profile, "lut", gamma=(value, value, value), table=())
 
 
 def _gain(profile: Profile, value: float) -> Profile:
-    return replace(profile, lut=replace(profile.lut, gain=(value, value, value)))
+    return within(profile, "lut", gain=(value, value, value))
 
 
 def _crosstalk(profile: Profile, value: float) -> Profile:
-    return replace(profile, crosstalk=replace(profile.crosstalk, width=value), sampling=max(3, profile.sampling))
+    return replace(within(profile, "crosstalk", width=value), sampling=max(3, profile.sampling))
 
 
 def _fill(profile: Profile, value: float) -> Profile:
-    if profile.aperture is None:
-        return profile
-    return replace(profile, aperture=replace(profile.aperture, fill=value))
-
-
-def _flicker(profile: Profile, value: float) -> Profile:
-    return replace(profile, flicker=replace(profile.flicker, rms=value))
-
-
-def _beam(profile: Profile, value: float) -> Profile:
-    return replace(profile, illumination=replace(profile.illumination, beam_sigma=value))
-
-
-def _fringes(profile: Profile, value: float) -> Profile:
-    return replace(profile, illumination=replace(profile.illumination, fringes=value))
-
-
-def _wavefront(profile: Profile, value: float) -> Profile:
-    return replace(profile, illumination=replace(profile.illumination, phase_rms=value))
+    return profile if profile.aperture is None else within(profile, "aperture", fill=value)
 
 
 def _distance(profile: Profile, value: float) -> Profile:
-    return replace(profile, propagation=replace(profile.propagation, distance_error=value / 100))
+    return within(profile, "propagation", distance_error=value / 100)
 
 
-def _astigmatism(profile: Profile, value: float) -> Profile:
-    return _aberration(profile, "astigmatism_0", value, 2)
-
-
-def _coma(profile: Profile, value: float) -> Profile:
-    return _aberration(profile, "coma_x", value, 3)
-
-
-def _aberration(profile: Profile, name: str, value: float, power: int) -> Profile:
+def _aberration(name: str, power: int) -> Put:
     """The ranges are of a wide iris; through a smaller one the same lenses have less, by that power of its radius."""
-    waves = value * ((profile.panel.pupil or 1.0) / WIDE) ** power
-    way = profile.propagation
-    return replace(profile, propagation=replace(way, aberration={**way.aberration, name: waves}))
 
+    def put(profile: Profile, value: float) -> Profile:
+        waves = value * ((profile.panel.pupil or 1.0) / WIDE) ** power
+        return within(profile, "propagation", aberration={**profile.propagation.aberration, name: waves})
 
-def _zero_order(profile: Profile, value: float) -> Profile:
-    return replace(profile, zero_order=replace(profile.zero_order, fraction=value))
-
-
-def _zero_phase(profile: Profile, value: float) -> Profile:
-    return replace(profile, zero_order=replace(profile.zero_order, phase=value))
+    return put
 
 
 def _width(profile: Profile, value: float) -> Profile:
     if not 0 < max(profile.spectrum.width) <= LASER:  # no laser: what is drawn would be another kind of source
         return profile
-    width = (value * 1e-9, value * 1e-9, value * 1e-9)
-    return replace(profile, spectrum=replace(profile.spectrum, width=width))
+    return within(profile, "spectrum", width=(value * 1e-9, value * 1e-9, value * 1e-9))
 
 
-def _share(profile: Profile, value: float) -> Profile:
-    if not profile.stray_light.share:
-        return profile
-    return replace(profile, stray_light=replace(profile.stray_light, share=value))
-
-
-def _reach(profile: Profile, value: float) -> Profile:
-    if not profile.stray_light.share:
-        return profile
-    return replace(profile, stray_light=replace(profile.stray_light, reach=value))
+def _stray(key: str) -> Put:
+    """Of a profile that has stray light at all."""
+    return lambda profile, value: within(profile, "stray_light", **{key: value} if profile.stray_light.share else {})
 
 
 def _specks(profile: Profile, value: float) -> Profile:
-    return replace(profile, coherent_noise=replace(profile.coherent_noise, specks=round(value)))
+    return within(profile, "coherent_noise", specks=round(value))
 
 
 PARAMETERS: Mapping[str, Parameter] = {
@@ -130,21 +98,33 @@ PARAMETERS: Mapping[str, Parameter] = {
     ),
     "crosstalk": Parameter("crosstalk", "px", 0.2, 0.5, "0.25 px measured, 0.3-0.5 plausible at 6.4 um", _crosstalk),
     "fill": Parameter("fill factor", "", 0.87, 0.95, "87 % of one 8 um panel, under 95 % usual", _fill),
-    "flicker": Parameter("flicker", "of the stroke", 0.0, 0.05, "0-5 % of 2 pi reported", _flicker),
-    "beam": Parameter("width of the beam", "panel heights", 0.93, 1.57, "1000-1700 px in use", _beam),
-    "fringes": Parameter("fringes", "of the amplitude", 0.0, 0.1, "5-10 % from an uncoated cover glass", _fringes),
-    "wavefront": Parameter("phase of the beam", "rad rms", 0.0, 0.4, "assumed, up to lambda / 16", _wavefront),
+    "flicker": Parameter("flicker", "of the stroke", 0.0, 0.05, "0-5 % of 2 pi reported", _of("flicker", "rms")),
+    "beam": Parameter(
+        "width of the beam", "panel heights", 0.93, 1.57, "1000-1700 px in use", _of("illumination", "beam_sigma")
+    ),
+    "fringes": Parameter(
+        "fringes", "of the amplitude", 0.0, 0.1, "5-10 % from an uncoated cover glass", _of("illumination", "fringes")
+    ),
+    "wavefront": Parameter(
+        "phase of the beam", "rad rms", 0.0, 0.4, "assumed, up to lambda / 16", _of("illumination", "phase_rms")
+    ),
     "distance": Parameter("error of the distance", "%", -1.0, 1.0, "0.1-1 % when focused by eye", _distance),
-    "astigmatism": Parameter("astigmatism", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _astigmatism),
-    "coma": Parameter("coma", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _coma),
-    "zero_order": Parameter("unmodulated light", "of the power", 0.0, 0.35, "20 % usual, 35 % reported", _zero_order),
-    "zero_phase": Parameter("phase of the unmodulated light", "rad", -TAU / 2, TAU / 2, "unknown", _zero_phase),
+    "astigmatism": Parameter(
+        "astigmatism", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _aberration("astigmatism_0", 2)
+    ),
+    "coma": Parameter("coma", "waves rms", -0.15, 0.15, "up to a few tenths of a wave", _aberration("coma_x", 3)),
+    "zero_order": Parameter(
+        "unmodulated light", "of the power", 0.0, 0.35, "20 % usual, 35 % reported", _of("zero_order", "fraction")
+    ),
+    "zero_phase": Parameter(
+        "phase of the unmodulated light", "rad", -TAU / 2, TAU / 2, "unknown", _of("zero_order", "phase")
+    ),
     "specks": Parameter("specks of dust on the panel", "", 0.0, 50.0, "assumed", _specks),
     "linewidth": Parameter("width of the laser line", "nm", 1.0, 5.0, "1-5 nm of laser diodes", _width),
     "stray": Parameter(
-        "stray light", "of the light", 0.0, 0.3, "assumed, a contrast of 6:1 in a fine checkerboard", _share
+        "stray light", "of the light", 0.0, 0.3, "assumed, a contrast of 6:1 in a fine checkerboard", _stray("share")
     ),
-    "reach": Parameter("reach of the stray light", "panel heights", 0.05, 0.3, "assumed", _reach),
+    "reach": Parameter("reach of the stray light", "panel heights", 0.05, 0.3, "assumed", _stray("reach")),
 }
 """What is drawn. Ranges without another source are those of the sources that the profiles name."""
 

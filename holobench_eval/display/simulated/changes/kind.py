@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ..profile import Profile
 
@@ -46,3 +47,8 @@ class Kind:
 def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Value], Profile]:
     """A change by a number, which is not asked for names."""
     return lambda profile, value: change(profile, float(value))
+
+
+def within(profile: Profile, stage: str, **values: Any) -> Profile:
+    """The profile with other values of a stage, by its key in a profile, or of its panel."""
+    return replace(profile, **{stage: replace(getattr(profile, stage), **values)})

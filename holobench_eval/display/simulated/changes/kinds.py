@@ -14,7 +14,7 @@ from ....core.errors import UserError, suggest
 from ..profile import Profile
 from ..stages import AddedLens, Eye
 from . import camera, draws, vision
-from .kind import Kind, Value, number
+from .kind import Kind, Value, number, within
 
 USUAL_BITS = 8  # of the panels that a bit-depth sweep starts from
 GREEN = 517e-9  # wavelength [m] that a drift of the lasers is given at
@@ -24,39 +24,35 @@ Haller's law, birefringence ~ (1 - T / T_clearing)^0.2 (Haller, Progress in Soli
 
 
 def _drift(profile: Profile, days: float) -> Profile:
-    return replace(profile, drift=replace(profile.drift, days=profile.drift.days + days))
+    return within(profile, "drift", days=profile.drift.days + days)
 
 
 def _distance(profile: Profile, percent: float) -> Profile:
-    way = profile.propagation
-    return replace(profile, propagation=replace(way, distance_error=way.distance_error + percent / 100))
+    return within(profile, "propagation", distance_error=profile.propagation.distance_error + percent / 100)
 
 
 def _wavelength(profile: Profile, nanometres: float) -> Profile:
-    way = profile.propagation
-    moved = way.wavelength_error + nanometres * 1e-9 / GREEN
-    return replace(profile, propagation=replace(way, wavelength_error=moved))
+    moved = profile.propagation.wavelength_error + nanometres * 1e-9 / GREEN
+    return within(profile, "propagation", wavelength_error=moved)
 
 
 def _defocus(profile: Profile, waves: float) -> Profile:
-    way = profile.propagation
-    defocus = way.aberration.get("defocus", 0.0) + waves
-    return replace(profile, propagation=replace(way, aberration={**way.aberration, "defocus": defocus}))
+    before = profile.propagation.aberration
+    return within(profile, "propagation", aberration={**before, "defocus": before.get("defocus", 0.0) + waves})
 
 
 def _obstruction(profile: Profile, radius: float) -> Profile:
-    way = profile.propagation
-    return replace(profile, propagation=replace(way, obstruction=max(way.obstruction, radius)))
+    return within(profile, "propagation", obstruction=max(profile.propagation.obstruction, radius))
 
 
 def _power(profile: Profile, factor: float) -> Profile:
-    return replace(profile, illumination=replace(profile.illumination, power=profile.illumination.power * factor))
+    return within(profile, "illumination", power=profile.illumination.power * factor)
 
 
 def _temperature(profile: Profile, kelvin: float) -> Profile:
     stroke = ((CLEARING - OPERATING - kelvin) / (CLEARING - OPERATING)) ** HALLER
     red, green, blue = (gain * stroke for gain in profile.lut.gain)
-    return replace(profile, lut=replace(profile.lut, gain=(red, green, blue)))
+    return within(profile, "lut", gain=(red, green, blue))
 
 
 def _bits(profile: Profile, bits: float) -> Profile:
@@ -66,7 +62,7 @@ def _bits(profile: Profile, bits: float) -> Profile:
         )
     if bits != int(bits):
         raise UserError(f"a panel has a whole number of bits, got {bits:g}")
-    return replace(profile, panel=replace(profile.panel, bits=int(bits)))
+    return within(profile, "panel", bits=int(bits))
 
 
 def _sibling(profile: Profile, value: Value) -> Profile:
@@ -74,7 +70,7 @@ def _sibling(profile: Profile, value: Value) -> Profile:
 
 
 def _ambient(profile: Profile, level: float) -> Profile:
-    return replace(profile, sensor=replace(profile.sensor, ambient=profile.sensor.ambient + level))
+    return within(profile, "sensor", ambient=profile.sensor.ambient + level)
 
 
 def _refocus(profile: Profile, millimetres: float) -> Profile:
