@@ -1,5 +1,6 @@
 """Settings for every test: one thread, the same examples on every run, no deadlines on a shared machine."""
 
+import signal
 from pathlib import Path
 
 import matplotlib
@@ -13,6 +14,8 @@ from tests.support import fake_study
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 torch.set_num_threads(1)
+# A shell that starts the tests in the background has Ctrl-C ignored, and so would all processes that tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
