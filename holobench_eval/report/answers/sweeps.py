@@ -29,15 +29,16 @@ def verdicts(results: Results) -> Iterator[str]:
         parts = [*_ranges(here), *_recovered(results, here)]
         parts = parts or [part for label in _followed(results, before) for part in _costs(here, label)]
         if parts:
-            yield f"{f'{before}: ' * (len(displays) > 1)}{'; '.join(parts)}."
+            first, over, rest = "; ".join(parts).partition(f" over {results.layout.baseline}")
+            yield f"{f'{before}: ' * (len(displays) > 1)}{first}{over}{rest.replace(over, '') if over else ''}."
     for sweep in found:
         if claim := sweep.swept.claim:
             yield from (_claim(sweep, label, claim) for label in subjects(results)[:1] if label in sweep.methods)
 
 
 def _followed(results: Results, before: str) -> list[str]:
-    """The methods of the question, else the best before the change."""
-    return subjects(results)[:MOST] or results.ranking(before, categories=(*OFFLINE, ONLINE))[:1]
+    """The methods of the question, then the best before the change that solves before it."""
+    return list(dict.fromkeys([*subjects(results), *results.ranking(before, categories=OFFLINE)[:1]]))[:MOST]
 
 
 def value_text(sweep: Sweep, value: float | str) -> str:
@@ -57,12 +58,12 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
     if lead is None or label == baseline:
         yield cost
     elif lead.mean <= 0:
-        yield f"{cost}, with no lead over {baseline} before any change ({score.with_unit(lead.mean, signed=True)})"
+        yield f"{cost}, with no lead over {baseline} before ({score.with_unit(lead.mean, signed=True)})"
     else:
         gains = [gain for each in here for _, name in each.swept.points if (gain := each.gain(label, name))]
         least = min(gains, key=lambda gain: gain.mean, default=lead)
         ends = "stays" if least.mean > 0 else "is lost"
-        yield f"{cost}; its lead over {baseline} {ends}, {score.with_unit(least.mean, signed=True)} at the least"
+        yield f"{cost}; its lead over {baseline} {ends}, {score.with_unit(least.mean, signed=True)} at least"
 
 
 def _ranges(here: list[Sweep]) -> Iterator[str]:

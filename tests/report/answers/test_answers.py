@@ -253,7 +253,7 @@ def test_a_sweep_says_the_worst_loss_and_whether_a_lead_stays() -> None:
     text = answer(sweep(sweeps=without, question="Does HIL stay?"))
     assert text == (
         "HIL loses at most +9.00 dB [+9.00, +9.00] (drift since calibration, 90 days); its lead over Wirtinger is "
-        "lost, -5.00 dB at the least."
+        "lost, -5.00 dB at least."
     )
 
 

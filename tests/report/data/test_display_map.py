@@ -92,7 +92,7 @@ def test_a_display_left_out_is_predicted_as_by_a_fit_without_it() -> None:
 def test_shares_that_decide_nothing_explain_nothing() -> None:
     draw = np.random.default_rng(2)
     explained = []
-    for _ in range(50):
+    for _ in range(20):
         gains = dict(zip(DISPLAYS, draw.normal(size=10), strict=True))
         found = display_map(replace(study(gains.__getitem__), related={"budget": budget()}))
         assert found is not None
