@@ -16,29 +16,29 @@ from ..markdown import Markdown, table
 from .kind import Kind, subjects
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
-MOST = 2  # methods that a verdict follows
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """One a display: how far a lens moves the picture, what glasses get back, or what changes cost at most; then the
-    claims of the config."""
+    """One a display, how far a lens moves the picture or what glasses get back, else one a method, what changes cost at
+    most; then the claims of the config."""
     found = [sweep for sweep in sweeps(results) if sweep.methods]
     displays = list(dict.fromkeys(sweep.swept.before for sweep in found))
     for before in displays:
         here = [sweep for sweep in found if sweep.swept.before == before]
-        parts = [*_ranges(here), *_recovered(results, here)]
-        parts = parts or [part for label in _followed(results, before) for part in _costs(here, label)]
+        named, parts = f"{before}: " * (len(displays) > 1), [*_ranges(here), *_recovered(results, here)]
         if parts:
-            first, over, rest = "; ".join(parts).partition(f" over {results.layout.baseline}")
-            yield f"{f'{before}: ' * (len(displays) > 1)}{first}{over}{rest.replace(over, '') if over else ''}."
+            yield f"{named}{'; '.join(parts)}."
+            continue
+        for label in _followed(results, before):
+            yield from (f"{named}{cost}." for cost in _costs(here, label))
     for sweep in found:
         if claim := sweep.swept.claim:
             yield from (_claim(sweep, label, claim) for label in subjects(results)[:1] if label in sweep.methods)
 
 
 def _followed(results: Results, before: str) -> list[str]:
-    """The methods of the question, then the best before the change that solves before it."""
-    return list(dict.fromkeys([*subjects(results), *results.ranking(before, categories=OFFLINE)[:1]]))[:MOST]
+    """The methods of the question, and the best before the change of those that solve before it."""
+    return list(dict.fromkeys([*subjects(results), *results.ranking(before, categories=OFFLINE)[:1]]))
 
 
 def value_text(sweep: Sweep, value: float | str) -> str:
