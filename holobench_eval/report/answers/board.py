@@ -40,7 +40,7 @@ def display_table(board: Board, display: Display) -> Markdown:
 
 def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) -> list[object]:
     score, results = board.results.headline, board.results
-    title, name = results.layout.titles.get(row.label), code(results.names[row.label])
+    title, name = results.layout.titles.get(row.label), code(row.label)
     marks = [*row.marks, *([f"{row.scored} of {len(results.targets)} targets"] * (row.scored < len(results.targets)))]
     named = Markdown("{} ({})").format(title, name) if title else Markdown("{}").format(row.label)
     named = Markdown(", ").join([named, *(Markdown("{}").format(mark) for mark in marks)])

@@ -37,8 +37,9 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def _followed(results: Results, before: str) -> list[str]:
-    """The methods of the question, and the best before the change of those that solve before it."""
-    return list(dict.fromkeys([*subjects(results), *results.ranking(before, categories=OFFLINE)[:1]]))
+    """The methods of the question, and the best before the change, if there are any of those that solve before it."""
+    best = [results.ranking(before, categories=categories)[:1] for categories in (OFFLINE, (ONLINE,))]
+    return list(dict.fromkeys([*subjects(results), *(best[0] or best[1])]))
 
 
 def value_text(sweep: Sweep, value: float | str) -> str:

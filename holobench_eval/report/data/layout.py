@@ -242,7 +242,7 @@ def layout_of(study: Study) -> Layout:
         titles={
             entry.label: f"{title}{entry.label.removeprefix(entry.name)}"
             for entry in study.methods
-            if (title := traits[entry.label].title) and re.match(rf"{re.escape(entry.name)}(?!\w)", entry.label)
+            if (title := traits[entry.label].title) and re.match(rf"{re.escape(entry.name)}(?![\w-])", entry.label)
         },
         tuned={label: method.tuned for label, method in traits.items() if method.tuned is not None},
         note=study.note,

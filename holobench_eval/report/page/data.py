@@ -56,10 +56,11 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {"name": text.floor_name(floor), "mean": _number(results.values(floor, results.reference(name)).mean())}
+                {"name": text.floor_name(floor), "mean": _number(results.row(floor, results.reference(name))[column])}
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
+            for column in [results.headline.column]
             for name in results.conditions
         },
         "magma": colormaps["magma"](range(256), bytes=True)[:, :3].tolist(),

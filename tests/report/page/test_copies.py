@@ -31,7 +31,7 @@ def again(report: Report) -> Report:
 
 
 def copies(report: Report) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in report.thumbnails.copies.iterdir()}
+    return {path.name: path.read_bytes() for path in report.thumbnails.copies.glob("*.webp")}
 
 
 def test_a_clone_shows_the_pictures_of_the_run(report: Report) -> None:
@@ -69,4 +69,21 @@ def test_writing_again_without_records_leaves_the_copies(report: Report) -> None
     clone = again(report)
     keep_copies(clone)
     assert copies(clone) == kept
-    assert load_picture(next(clone.thumbnails.copies.iterdir())) is not None
+    assert load_picture(next(clone.thumbnails.copies.glob("*.webp"))) is not None
+
+
+def test_a_folder_of_somebody_else_stays_as_it_is(report: Report) -> None:
+    report.thumbnails.copies.mkdir()
+    (report.thumbnails.copies / "mine.webp").write_bytes(b"x")
+    keep_copies(report)
+    assert copies(report) == {"mine.webp": b"x"}
+
+
+def test_copies_whose_thumbnails_are_gone_stay_and_damaged_thumbnails_have_none(report: Report) -> None:
+    keep_copies(report)
+    kept = copies(report)
+    first, second, *_ = sorted(report.thumbnails.store.folder.glob("*.png"))
+    first.unlink()
+    second.write_bytes(b"no picture")
+    keep_copies(Report(report.results, report.records, report.output, {}, report.description))
+    assert copies(report) == {name: content for name, content in kept.items() if name != f"{second.stem}.webp"}
