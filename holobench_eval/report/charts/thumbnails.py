@@ -18,12 +18,11 @@ COPIES = "pictures"  # folder of the small copies that a report keeps
 
 
 class Thumbnails:
-    """Pictures of a report's targets and captures; ``absent`` holds the names of files that were asked for in vain."""
+    """Pictures of a report's targets and captures, as far as they are there."""
 
     def __init__(self, results: Results, output: Path) -> None:
         """output: the folder of the report."""
         self.results, self.store, self.copies = results, Store(output), output / COPIES
-        self.absent: set[str] = set()
         self._targets: dict[str, dict[str, Picture]] = {}
 
     def of_capture(self, cell: str) -> Path:
@@ -43,7 +42,7 @@ class Thumbnails:
         shape = self.results.shape(reference)
         if reference not in self._targets:
             paths = {target: self.of_target(target, shape) for target in self.results.targets}
-            pictures = ((target, self._load(path)) for target, path in paths.items())
+            pictures = ((target, load_picture(path)) for target, path in paths.items())
             self._targets[reference] = {target: picture for target, picture in pictures if picture is not None}
         return self._targets[reference]
 
@@ -57,7 +56,7 @@ class Thumbnails:
         if done.empty:
             return Tile(None, f"{cells.iloc[0]['state']}: {cells.iloc[0]['reason']}")
         cell, shape = done.iloc[0], self.targets(condition)[target].shape
-        picture = self._load(self.of_capture(str(cell["cell"])))
+        picture = load_picture(self.of_capture(str(cell["cell"])))
         if picture is None:
             return Tile(None, "no thumbnail of this capture")
         if picture.shape != shape:
@@ -78,12 +77,6 @@ class Thumbnails:
         """The target in the middle of ``by_quality``."""
         ordered = self.by_quality(condition)
         return ordered[len(ordered) // 2]
-
-    def _load(self, path: Path) -> Picture | None:
-        picture = load_picture(path)
-        if picture is None:
-            self.absent.add(path.name)
-        return picture
 
 
 def noted(scores: Sequence[Score], cell: pd.Series) -> str:
