@@ -46,7 +46,6 @@ COMMANDS = {
         "new_display",
         "conformance",
         "calibrate",
-        "bench",
     ),
 }
 

@@ -50,17 +50,13 @@ class Work:
 
 @dataclass(frozen=True)
 class Case:
-    """group: the same work; version: who does it. make: prepares it for a scene, or without one.
-
-    threads: of torch; apart: each version is timed in a process of its own, which it may find fresh or steady.
-    """
+    """group: the same work; version: who does it. make: prepares it for a scene, or without one. threads: of torch."""
 
     group: str
     version: str
     make: Callable[..., Work]
     scene: Scene | None = None
     threads: int = THREADS
-    apart: bool = False
 
     @property
     def name(self):
@@ -228,8 +224,8 @@ methods: [{name: wirtinger, params: {iterations: 20}}]
 
 AT_100_MM = [Scene(PAPER, 0.1)]
 CASES = [
-    *of_scenes(STEP, COMPARED, gradient_steps(STEPS | PEERS), apart=True),
-    *of_scenes(STEP, COMPARED, gradient_steps(OF_JAX), apart=True, threads=1),
+    *of_scenes(STEP, COMPARED, gradient_steps(STEPS | PEERS)),
+    *of_scenes(STEP, COMPARED, gradient_steps(OF_JAX), threads=1),
     *of_scenes(
         STEP,
         [scene for scene in SIZES if scene not in COMPARED],

@@ -1,10 +1,7 @@
 """The panel, distance and picture that propagations and gradient steps are timed with."""
 
-import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from tempfile import gettempdir
 
 import torch
 from torch import Tensor
@@ -57,16 +54,13 @@ class Scene:
 
     def error(self, field: Tensor) -> float:
         """Relative rms error of the field ``(H, W)`` at the image plane, a constant factor aside."""
-        exact = self.reference()
+        exact = self.reference
         field = field.reshape(exact.shape).to(exact.dtype)
         field = field * ((field.conj() * exact).sum() / (field.abs() ** 2).sum())
         return float((field - exact).norm() / exact.norm())
 
+    @cached_property
     def reference(self) -> Tensor:
-        """The exact field: from the cache's folder, if a process was there before; it takes seconds and gigabytes."""
-        file = Path(os.environ.get("XDG_CACHE_HOME", gettempdir()), f"{self.name}.pt")
-        if not file.is_file():
-            model = AngularSpectrum(self.panel, PITCH, WAVELENGTH, self.distance, padding="reference")
-            light = torch.polar(torch.ones_like(self.phase[0]), self.phase[0]).to(torch.complex128)
-            torch.save(model.forward(light), file)
-        return torch.load(file)
+        """The exact field; it takes seconds and gigabytes, once."""
+        model = AngularSpectrum(self.panel, PITCH, WAVELENGTH, self.distance, padding="reference")
+        return model.forward(torch.polar(torch.ones_like(self.phase[0]), self.phase[0]).to(torch.complex128))

@@ -5,7 +5,6 @@ field at the image plane, for its accuracy. ``peers`` has the versions of other 
 """
 
 import torch
-from heap import as_a_study
 from scene import PITCH, THREADS, WAVELENGTH
 
 from holobench_eval.methods.common import unit_field
@@ -19,7 +18,6 @@ class ThisPackage:
     """The step of ``wirtinger``, at the default accuracy."""
 
     def __init__(self, scene):
-        as_a_study()
         spec = scene.spec
         self.phase, self.model = scene.phase, spec.propagator(0)
         self.objective = Objective(self.model, spec.region, scene.target, intensity_l2)

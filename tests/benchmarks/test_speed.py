@@ -1,19 +1,19 @@
-"""Everything that ``holoeval bench`` times, one after the other by pytest-benchmark, for a record of one's own:
-``pytest tests/benchmarks --benchmark-enable --benchmark-autosave``, and with ``--benchmark-compare`` the next time.
+"""What is timed, by pytest-benchmark (docs/speed.md). A plain test run calls each once, at an eighth of its size."""
 
-A plain test run calls each once, at an eighth of its size. What is compared with other versions takes turns instead, in
-processes of its own: ``holoeval bench``.
-"""
+from operator import attrgetter
 
 import pytest
+import torch
 from cases import CASES
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", sorted(CASES, key=attrgetter("group")), ids=lambda case: case.name)
 def test_speed(benchmark, case):
+    torch.set_num_threads(case.threads if benchmark.enabled else torch.get_num_threads())
     try:
         work = (case if benchmark.enabled else case.shrunk()).work()
     except ModuleNotFoundError as error:
         pytest.skip(f"{error.name} is not installed")
     benchmark.group = case.group
     benchmark.pedantic(work.call, warmup_rounds=1 if benchmark.enabled else 0, rounds=7 if benchmark.enabled else 1)
+    benchmark.extra_info.update(work.facts(), version=case.version)

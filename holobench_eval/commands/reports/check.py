@@ -44,17 +44,12 @@ def check(
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
     """Number of reports (``committed.reports_in``), and a line for all that no longer holds. UserError: no reports."""
-    from ...benchmarks import report as performance
     from ...study import provenance
 
     reports = committed.reports_in(folder)
-    patterns = (performance.MACHINE, f"*/{performance.MACHINE}")
-    timed = sorted(path.parent for pattern in patterns for path in folder.glob(pattern))
-    if not reports and not timed:
+    if not reports:
         raise UserError(f"{folder}: no report, and none in its folders (looked for {provenance.FILE})")
-    problems = [f"{report}: {problem}" for report in reports for problem in _problems(report)]
-    problems += [f"{report}: {problem}" for report in timed for problem in performance.problems(report)]
-    return len(reports) + len(timed), problems
+    return len(reports), [f"{report}: {problem}" for report in reports for problem in _problems(report)]
 
 
 def _earlier(folder: Path) -> Iterator[str]:

@@ -41,10 +41,6 @@ def test_a_report_itself_is_checked_as_one_in_its_folder(report: Path) -> None:
     assert problems_in(report) == problems_in(report.parent) == (1, [])
 
 
-def test_the_report_of_performance_is_checked_by_itself() -> None:
-    assert problems_in(Path(__file__).parents[3] / "reports" / "performance") == (1, [])
-
-
 def test_a_changed_number_in_a_table_is_found(report: Path) -> None:
     table = report / "table.csv"
     table.write_text(re.sub("(Toy,open loop,.*?,,,,)2,", r"\g<1>3,", table.read_text()))
