@@ -8,7 +8,7 @@ from typing import Any
 
 import torch
 from peers import OF_JAX, PEERS
-from scene import THREADS, Scene
+from scene import SHRINK, THREADS, Scene
 from steps import BARE, OURS, STEPS
 
 from holobench_eval.display import load_profile
@@ -27,6 +27,14 @@ DISTANCES = (0.02, 0.1, 0.2)
 COMPARED = [Scene(PAPER, distance) for distance in DISTANCES]
 SIZES = [Scene(panel, distance) for panel in ((256, 256), (540, 960), PAPER, (2160, 3840)) for distance in DISTANCES]
 STEP, PROPAGATION, SSIM = "gradient step", "propagation", "SSIM, one channel"
+STUDY = """
+title: benchmark
+seed: 1
+display: {{profiles: [{profile}], panel: [{side}, {side}]}}
+targets: {{dataset: photographs, params: {{names: [astronaut]}}}}
+methods: [{{name: {method}, params: {{iterations: {iterations}}}}}]
+repeats: {repeats}
+"""
 TRIVIAL = """
 from dataclasses import dataclass
 
@@ -35,9 +43,25 @@ import torch
 
 @dataclass(frozen=True)
 class Trivial:
+    iterations: int = 1
+
     def solve(self, target, bench):
         return torch.zeros(1, target.shape[1], *bench.spec.shape)
 """
+
+
+@dataclass(frozen=True)
+class CellStudy:
+    """A study of one target, in three colours."""
+
+    profile: str
+    side: int
+    method: str
+    iterations: int = 1
+    repeats: int = 1
+
+    def shrunk(self):
+        return replace(self, iterations=1 + self.iterations // SHRINK, repeats=1 + self.repeats // SHRINK)
 
 
 @dataclass
@@ -50,12 +74,12 @@ class Work:
 
 @dataclass(frozen=True)
 class Case:
-    """group: the same work; version: who does it. make: prepares it for a scene, or without one. threads: of torch."""
+    """group: the same work; version: who does it. make: prepares it for a scene or a study. threads: of torch."""
 
     group: str
     version: str
     make: Callable[..., Work]
-    scene: Scene | None = None
+    scene: Scene | CellStudy
     threads: int = THREADS
 
     @property
@@ -63,11 +87,11 @@ class Case:
         return f"{self.group} | {self.version}"
 
     def work(self):
-        return self.make() if self.scene is None else self.make(self.scene)
+        return self.make(self.scene)
 
     def shrunk(self):
         """The same at an eighth of the size: does it run?"""
-        return self if self.scene is None else replace(self, scene=self.scene.shrunk())
+        return replace(self, scene=self.scene.shrunk())
 
 
 def of_scenes(kind, scenes, makers, **settings):
@@ -176,52 +200,28 @@ def network(backward):
     return make
 
 
-def study(text):
+def study(scene):
     """A study, from its plan to its last record, in a folder of its own each time."""
+    from rich.console import Console
 
-    def make():
-        kept = TemporaryDirectory(ignore_cleanup_errors=True)
-        folder = Path(kept.name)
-        (folder / "trivial.py").write_text(TRIVIAL)
-        (folder / "study.yaml").write_text(text)
-        loaded = load_study(folder / "study.yaml")
+    kept = TemporaryDirectory(ignore_cleanup_errors=True)
+    folder = Path(kept.name)
+    (folder / "trivial.py").write_text(TRIVIAL)
+    (folder / "study.yaml").write_text(STUDY.format(**vars(scene)))
+    loaded = load_study(folder / "study.yaml")
 
-        def call():
-            from rich.console import Console
+    def call():
+        with watching(Console(quiet=True)) as watch, TemporaryDirectory(dir=kept.name) as output:
+            run(loaded, plan.plan(loaded), Path(output), Serial(), watch, torch.get_num_threads(), folder / "artifacts")
 
-            with watching(Console(quiet=True)) as watch, TemporaryDirectory(dir=kept.name) as output:
-                artifacts = folder / "artifacts"
-                run(loaded, plan.plan(loaded), Path(output), Serial(), watch, torch.get_num_threads(), artifacts)
-
-        return Work(call)
-
-    return make
+    return Work(call)
 
 
-ONE_CELL = """
-title: one cell
-seed: 1
-display: {profiles: [leto-aged], panel: [192, 192]}
-targets: {dataset: photographs, params: {names: [astronaut]}}
-methods: [{name: wirtinger, params: {iterations: 100}}]
-"""
-TRIVIAL_CELLS = """
-title: fifty cells
-seed: 1
-display: {profiles: [ideal], panel: [118, 118]}
-targets: {dataset: photographs, params: {names: [astronaut]}}
-methods: [trivial.py:Trivial]
-repeats: 50
-"""
-
-SMALL_CELL = """
-title: a small cell
-seed: 1
-display: {profiles: [leto-aged], panel: [118, 118]}
-targets: {dataset: photographs, params: {names: [astronaut]}}
-methods: [{name: wirtinger, params: {iterations: 20}}]
-"""
-
+STUDIES = {
+    "one cell: Wirtinger, 100 iterations, 192x192, three colours": CellStudy("leto-aged", 192, "wirtinger", 100),
+    "one cell: Wirtinger, 20 iterations, 118x118, three colours": CellStudy("leto-aged", 118, "wirtinger", 20),
+    "50 trivial cells, 118x118": CellStudy("ideal", 118, "trivial.py:Trivial", repeats=50),
+}
 AT_100_MM = [Scene(PAPER, 0.1)]
 CASES = [
     *of_scenes(STEP, COMPARED, gradient_steps(STEPS | PEERS)),
@@ -250,7 +250,5 @@ CASES = [
         [Scene((256, 256), 0.1)],
         {"forward": network(False), "forward and backward": network(True)},
     ),
-    Case("study", "one cell: Wirtinger, 100 iterations, 192x192, three colours", study(ONE_CELL)),
-    Case("study", "one cell: Wirtinger, 20 iterations, 118x118, three colours", study(SMALL_CELL)),
-    Case("study", "50 trivial cells, 118x118", study(TRIVIAL_CELLS)),
+    *(Case("study", name, study, scene) for name, scene in STUDIES.items()),
 ]

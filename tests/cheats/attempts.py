@@ -2,7 +2,7 @@
 
 ``kind`` is the class of the attempt, ``outcome`` what has to come of it when the method runs in a process of its own:
 ``impossible`` (the cell is that of the honest phase), ``refused`` (it fails, for ``reason``), ``trusted`` (nothing
-keeps a method from it, and docs/start/trust.md says so).
+keeps a method from it, and docs/start/trust.md says so). ``calls``: 2 for what one call could do to the next.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ class Attempt:
     kind: ClassVar[str]
     outcome: ClassVar[str] = "impossible"
     reason: ClassVar[str] = ""
+    calls: ClassVar[int] = 1
 
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape))
@@ -277,6 +278,8 @@ class PhotographsMoreThanOne(Photographer):
 
 
 class PhotographsAfterItsAnswer(Photographer):
+    calls = 2
+
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         self.photographed(self.phase(target, bench)[0], [bench] * 20)
@@ -357,6 +360,8 @@ class FinishesInAnotherProcess(LiesAboutTime):
 class AnswersTwice(LiesAboutTime):
     """The second answer is the better one, and outside the clock."""
 
+    calls = 2
+
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         time.sleep(0.3)
@@ -373,7 +378,11 @@ class SetsItsPeakBack(LiesAboutTime):
             Path("/proc/self/clear_refs").write_text("5")
 
 
-BURNS = "import time\nheld = bytearray(b'1') * 150 * 2**20\nprint(1, flush=True)\nwhile time.process_time() < {}: pass"
+BURNS = """import time
+held = bytearray(b'1') * 150 * 2**20
+while time.process_time() < 0.4: pass
+print(1, flush=True)
+while {more}: pass"""
 
 
 class HasAnotherWork(LiesAboutTime):
@@ -381,7 +390,7 @@ class HasAnotherWork(LiesAboutTime):
     cpu: ClassVar[float] = 0.4
 
     def cheat(self, target, bench):
-        subprocess.run([sys.executable, "-c", BURNS.format(0.4)], stdout=subprocess.DEVNULL, check=True)
+        subprocess.run([sys.executable, "-c", BURNS.format(more=False)], stdout=subprocess.DEVNULL, check=True)
 
 
 class LeavesAnotherAtWork(LiesAboutTime):
@@ -391,10 +400,9 @@ class LeavesAnotherAtWork(LiesAboutTime):
     cpu: ClassVar[float] = 0.3
 
     def cheat(self, target, bench):
-        command = [sys.executable, "-c", BURNS.format(1e9)]
+        command = [sys.executable, "-c", BURNS.format(more=True)]
         left = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
         left.stdout.readline()
-        time.sleep(1.0)
 
 
 class LeavesAnOrphanAtWork(LiesAboutTime):
@@ -403,14 +411,18 @@ class LeavesAnOrphanAtWork(LiesAboutTime):
     cpu: ClassVar[float] = 0.3
 
     def cheat(self, target, bench):
+        ready, told = os.pipe()
         if (child := os.fork()) == 0:
             os.setsid()
             if os.fork() == 0:
+                while time.process_time() < 0.4:
+                    pass
+                os.write(told, b"1")
                 while True:
                     pass
             os._exit(0)
         os.waitpid(child, 0)
-        time.sleep(1.0)
+        os.read(ready, 1)
 
 
 # --- reaches the process that scores
@@ -438,63 +450,64 @@ class Reaching(Attempt):
     def solve(self, target, bench):
         return super().solve(target, bench) if os.getppid() == 1 else self.phase(target, bench)
 
-
-class StopsTheScorer(Reaching):
     def cheat(self, target, bench):
         for number in outside():
             with suppress(OSError):
-                os.kill(number, signal.SIGSTOP)
+                self.reach(number, target)
+
+
+class StopsTheScorer(Reaching):
+    def reach(self, number, target):
+        os.kill(number, signal.SIGSTOP)
 
 
 class InterruptsTheScorer(Reaching):
-    def cheat(self, target, bench):
-        for number in outside():
-            with suppress(OSError):
-                os.kill(number, signal.SIGINT)
+    def reach(self, number, target):
+        os.kill(number, signal.SIGINT)
 
 
 class KillsTheScorer(Reaching):
-    def cheat(self, target, bench):
-        for number in outside():
-            with suppress(OSError):
-                os.kill(number, signal.SIGKILL)
+    def reach(self, number, target):
+        os.kill(number, signal.SIGKILL)
 
 
 class StopsAllThereIs(Reaching):
-    def cheat(self, target, bench):
-        with suppress(OSError):
-            os.kill(-1, signal.SIGSTOP)
+    def reach(self, number, target):
+        os.kill(-1, signal.SIGSTOP)
 
 
 class StopsTheGroupOfTheScorer(Reaching):
+    def reach(self, number, target):
+        if (group := os.getpgid(number)) > 1:
+            os.killpg(group, signal.SIGSTOP)
+
+
+class ReachingFurther(Reaching):
     def cheat(self, target, bench):
-        for number in outside():
+        for number in outside() - {os.getppid()}:
             with suppress(OSError):
-                if (group := os.getpgid(number)) > 1:
-                    os.killpg(group, signal.SIGSTOP)
+                self.reach(number, target)
 
 
-class WritesIntoTheScorer(Reaching):
+class WritesIntoTheScorer(ReachingFurther):
     """Zeros in the place of its target, wherever that lies in memory."""
 
-    def cheat(self, target, bench):
+    def reach(self, number, target):
         sought = target[0, 0, 0, :16].contiguous().numpy().tobytes()
-        for number in outside() - {os.getppid()}:
-            with suppress(OSError), Path(f"/proc/{number}/mem").open("r+b", buffering=0) as memory:
-                for line in Path(f"/proc/{number}/maps").read_text().splitlines():
-                    first, last = (int(part, 16) for part in line.split()[0].split("-"))
-                    if "rw" in line.split()[1] and last - first < 2**28:
-                        with suppress(OSError, OverflowError):
-                            memory.seek(first)
-                            if (place := memory.read(last - first).find(sought)) >= 0:
-                                memory.seek(first + place)
-                                memory.write(bytes(len(sought)))
+        with Path(f"/proc/{number}/mem").open("r+b", buffering=0) as memory:
+            for line in Path(f"/proc/{number}/maps").read_text().splitlines():
+                first, last = (int(part, 16) for part in line.split()[0].split("-"))
+                if "rw" in line.split()[1] and last - first < 2**28:
+                    with suppress(OSError, OverflowError):
+                        memory.seek(first)
+                        if (place := memory.read(last - first).find(sought)) >= 0:
+                            memory.seek(first + place)
+                            memory.write(bytes(len(sought)))
 
 
-class AttachesToTheScorer(Reaching):
-    def cheat(self, target, bench):
-        for number in outside() - {os.getppid()}:
-            assert ctypes.CDLL(None).ptrace(16, number, None, None) == -1
+class AttachesToTheScorer(ReachingFurther):
+    def reach(self, number, target):
+        assert ctypes.CDLL(None).ptrace(16, number, None, None) == -1
 
 
 class StopsTheScorerFromAnotherProgram(Reaching):
@@ -503,34 +516,30 @@ class StopsTheScorerFromAnotherProgram(Reaching):
             subprocess.run(["pkill", "-STOP", "-f", "pytest|holoeval"], check=False)
 
 
-class LimitsTheScorer(Reaching):
-    def cheat(self, target, bench):
-        for number in outside() - {os.getppid()}:
-            with suppress(OSError):
-                resource.prlimit(number, resource.RLIMIT_CPU, (1, 1))
+class LimitsTheScorer(ReachingFurther):
+    def reach(self, number, target):
+        resource.prlimit(number, resource.RLIMIT_CPU, (1, 1))
 
 
-class SlowsTheScorer(Reaching):
-    def cheat(self, target, bench):
-        for number in outside() - {os.getppid()}:
-            with suppress(OSError):
-                os.sched_setaffinity(number, {0})
-                os.setpriority(os.PRIO_PROCESS, number, 19)
+class SlowsTheScorer(ReachingFurther):
+    def reach(self, number, target):
+        os.sched_setaffinity(number, {0})
+        os.setpriority(os.PRIO_PROCESS, number, 19)
 
 
 # --- keeps state
 
 
 class KeepsState(Attempt):
-    kind = "keeps state"
+    kind, calls = "keeps state", 2
 
 
 class CountsItsCalls(KeepsState):
-    calls: ClassVar[list] = []
+    seen: ClassVar[list] = []
 
     def phase(self, target, bench):
-        self.calls.append(1)
-        return super().phase(target, bench) + len(self.calls) - 1
+        self.seen.append(1)
+        return super().phase(target, bench) + len(self.seen) - 1
 
 
 class RemembersInAnotherModule(KeepsState):
@@ -594,6 +603,7 @@ class WritesToItsTarget(PoisonsRecords):
 
 
 class SendsItsOwnResult(PoisonsRecords):
+    calls = 2
     outcome, reason = "refused", "returned dict, not a phase"
 
     def cheat(self, target, bench):
@@ -607,6 +617,7 @@ class FloodsTheTerminal(PoisonsRecords):
 
 
 class SendsAPickle(PoisonsRecords):
+    calls = 2
     outcome, reason = "refused", "no answer"
 
     def cheat(self, target, bench):
@@ -689,6 +700,7 @@ class ClaimsThatTheDiskIsFull(Ender):
 
 
 class KillsItsParent(Attempt):
+    calls = 2
     kind = "ends the process"
 
     def cheat(self, target, bench):
@@ -696,6 +708,7 @@ class KillsItsParent(Attempt):
 
 
 class ClosesEverything(Ender):
+    calls = 2
     reason = "process of the method"
 
     def cheat(self, target, bench):
@@ -816,6 +829,8 @@ class Trusted(Attempt):
 
 
 class KeepsAFile(Trusted):
+    calls = 2
+
     def cheat(self, target, bench):
         file = Path(__file__).with_name("kept.bin")
         seen = file.read_bytes() if file.exists() else b""

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from holobench_eval.study.isolation import process
 from tests.cheats import attempts
 from tests.study.test_run import compute
 
-ENDLESS = ("RunsForEver", "ForbidsItsEnd", "AnswersWithoutAnEnd", "StopsItself")
 NAMES = [
     name
     for name, value in vars(attempts).items()
@@ -21,10 +21,11 @@ NAMES = [
     and not value.__subclasses__()
     and name != "Beside"
 ]
-DIGITS = ("scores", "efficiency", "brightness", "saturated", "captures", "registration_residual_px")
+DIGITS = ("scores", "efficiency", "brightness", "saturated", "registration_residual_px")
+PART = process.KEPT - 4  # attempts of a study, else their processes would be started again for every step of it
 
 
-def scored(folder: Path, names: list[str], seconds: float = 60.0, isolation: str = "files") -> dict[str, list[Any]]:
+def scored(folder: Path, names: list[str], calls: int, seconds: float, isolation: str = "files") -> dict[str, Any]:
     """Records by label of a study of these attempts, with methods of the package after them, in one process."""
     listed = ""
     for name in names:
@@ -38,7 +39,7 @@ display: {{profiles: [leto-mild], panel: [128, 160]}}
 targets: {{dataset: photographs, params: {{count: 1}}}}
 training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1, captures: 3}}
 protocol: {{metrics: [psnr]}}
-repeats: 2
+repeats: {calls}
 isolation: {isolation}
 limits: {{seconds: {seconds}, memory_gib: 3}}
 methods:
@@ -53,36 +54,24 @@ methods:
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
-    """Of all attempts but the endless ones."""
-    return scored(tmp_path_factory.mktemp("cheats"), [name for name in NAMES if name not in ENDLESS])
+def studies(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[Any]]]:
+    """All attempts, together with those that need as many calls and as long a limit."""
+    alike: dict[tuple[int, float], list[str]] = {}
+    for name in NAMES:
+        attempt = getattr(attempts, name)
+        alike.setdefault((attempt.calls, 2.0 if "more than" in attempt.reason else 60.0), []).append(name)
+    parts = [(names[at : at + PART], *how) for how, names in alike.items() for at in range(0, len(names), PART)]
+    return [scored(tmp_path_factory.mktemp("cheats"), *part) for part in parts]
 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
-    """The same study without a cheat, its honest methods inside."""
-    return scored(tmp_path_factory.mktemp("alone"), [], isolation="none")
+    """A study without a cheat, its honest methods inside."""
+    return scored(tmp_path_factory.mktemp("alone"), [], 2, 60.0, isolation="none")
 
 
 def digits(found: list[Any]) -> list[Any]:
-    return [[record.get(name) for name in DIGITS if name != "captures"] for record in found]
-
-
-def check(name: str, found: list[Any], honest: list[Any]) -> None:
-    """The declared outcome of an attempt."""
-    attempt = getattr(attempts, name)
-    for record in found:
-        if attempt.outcome == "refused":
-            assert record["state"] == "failed", record["scores"]
-            assert attempt.reason in record["reason"]
-        else:
-            assert record["state"] == "done", record["reason"]
-            assert record["captures"] in (0, 2) if getattr(attempt, "camera", False) else record["captures"] == 0
-            assert record["seconds"] > (0.4 if getattr(attempt, "slow", False) else 0.0)
-            assert (record["memory_mib"] or math.inf) > getattr(attempt, "mib", 0)
-            assert (record["cpu_s"] or math.inf) > getattr(attempt, "cpu", 0)
-    if attempt.outcome == "impossible":
-        assert digits(found) == digits(honest)
+    return [[record.get(name) for name in DIGITS] for record in found]
 
 
 def test_the_page_on_trust_counts_the_attempts() -> None:
@@ -95,20 +84,28 @@ def test_the_page_on_trust_counts_the_attempts() -> None:
     assert f"{len(cheats)} attempts" in page
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in ENDLESS])
-def test_an_attempt_has_its_outcome(name: str, records: dict[str, list[Any]], alone: dict[str, list[Any]]) -> None:
-    check(name, records[name], alone["beside"])
+@pytest.mark.parametrize("name", NAMES)
+def test_an_attempt_has_its_outcome(name: str, studies: list[dict[str, Any]], alone: dict[str, Any]) -> None:
+    attempt = getattr(attempts, name)
+    (found,) = (study[name] for study in studies if name in study)
+    assert len(found) == attempt.calls
+    for record in found:
+        if attempt.outcome == "refused":
+            assert record["state"] == "failed", record["scores"]
+            assert attempt.reason in record["reason"]
+        else:
+            assert record["state"] == "done", record["reason"]
+            assert record["captures"] in (0, 2) if getattr(attempt, "camera", False) else record["captures"] == 0
+            assert record["seconds"] > (0.4 if getattr(attempt, "slow", False) else 0.0)
+            assert (record["memory_mib"] or math.inf) > getattr(attempt, "mib", 0)
+            assert (record["cpu_s"] or math.inf) > getattr(attempt, "cpu", 0)
+    if attempt.outcome == "impossible":
+        assert digits(found) == digits(alone["beside"][: len(found)])
 
 
+@pytest.mark.parametrize("label", ["beside", "double_phase"])
 def test_no_attempt_changes_a_digit_of_the_methods_beside_it(
-    records: dict[str, list[Any]], alone: dict[str, list[Any]]
+    label: str, studies: list[dict[str, Any]], alone: dict[str, Any]
 ) -> None:
-    for label in ("beside", "double_phase"):
-        assert digits(records[label]) == digits(alone[label])
-
-
-def test_a_method_that_does_not_end_is_ended(tmp_path: Path, alone: dict[str, list[Any]]) -> None:
-    found = scored(tmp_path, list(ENDLESS), seconds=2.0)
-    for name in ENDLESS:
-        check(name, found[name], alone["beside"])
-    assert digits(found["beside"]) == digits(alone["beside"])
+    for study in studies:
+        assert digits(study[label]) == digits(alone[label][: len(study[label])])

@@ -18,30 +18,10 @@ from holobench_eval.commands import main, options
 from holobench_eval.report.charts import sheet
 
 Call = Callable[..., tuple[int, str, str]]
-PLUGINS = """
-import hashlib
+PLUGIN = """
 from dataclasses import dataclass
 
 import torch
-
-
-@dataclass(frozen=True)
-class Images:
-    def items(self):
-        return ["steps"]
-
-    def digest(self, item):
-        return hashlib.sha256(item.encode()).hexdigest()
-
-    def load(self, item, shape, channels=3):
-        steps = (torch.arange(shape[1]) * 4 // shape[1] + 1) / 5
-        return steps.expand(channels, *shape).clone()
-
-
-@dataclass(frozen=True)
-class Flat:
-    def solve(self, target, bench):
-        return torch.zeros(*target.shape[:2], *bench.spec.shape)
 
 
 @dataclass(frozen=True)
@@ -53,8 +33,9 @@ class Blind:
 CONFIG = """\
 title: Command line
 display: {profiles: [ideal], panel: [128, 128]}
-targets: {dataset: "plugins.py:Images"}
-methods: ["plugins.py:Flat", "plugins.py:Blind"]
+targets: {dataset: charts, params: {names: [gray_ramp]}}
+protocol: {metrics: [psnr, ssim]}
+methods: [double_phase, "blind.py:Blind"]
 """
 
 
@@ -62,7 +43,7 @@ methods: ["plugins.py:Flat", "plugins.py:Blind"]
 def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "plugins.py").write_text(PLUGINS)
+    (tmp_path / "blind.py").write_text(PLUGIN)
     path = tmp_path / "toy.yaml"
     path.write_text(CONFIG)
     return path
@@ -112,7 +93,7 @@ def test_a_study_from_run_to_check(config: Path, call: Call) -> None:
     code, printed, _ = call("run", config, "--executor", "serial", "--threads", 1)
     assert code == 1
     assert "1 cell failed" in printed
-    assert "Flat" in printed
+    assert "double_phase" in printed
     assert "1 failed (Blind on ideal): " in printed
     assert Path("holoeval-results/toy/report.md").exists()
     tables = [Path("holoeval-results/toy", name).read_bytes() for name in ("table.csv", "records.csv")]

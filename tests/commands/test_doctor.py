@@ -1,7 +1,5 @@
 import json
 import shlex
-import subprocess
-import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -44,12 +42,11 @@ def named(findings, what):
     return next(each for each in findings if each.what == what)
 
 
-def test_this_installation_has_all_that_the_core_needs():
-    code = "from holobench_eval.commands import main; main()"
-    done = subprocess.run([sys.executable, "-c", code, "doctor"], capture_output=True, text=True, timeout=PATIENCE)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "the core is complete" in done.stdout
-    assert "cameras: gphoto2" in done.stdout
+def test_this_installation_has_all_that_the_core_needs(capsys):
+    code, said = exit_code(), capsys.readouterr().out
+    assert code == 0, said
+    assert "the core is complete" in said
+    assert "cameras: gphoto2" in said
 
 
 def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
@@ -88,12 +85,9 @@ def test_what_pip_gets_is_in_the_pinned_versions(quick):
     assert all(Path(shlex.split(command)[3]).is_file() for command in commands)
 
 
-def test_nothing_refers_to_pages_that_a_wheel_lacks(quick):
-    assert not [each for each in examine() if "docs/" in each.found + each.remedy]
-
-
-def test_everything_missing_has_something_to_do(quick):
+def test_everything_missing_has_something_to_do_and_nothing_refers_to_pages_that_a_wheel_lacks(quick):
     assert all(each.remedy for each in examine() if each.state != "ok")
+    assert not [each for each in examine() if "docs/" in each.found + each.remedy]
 
 
 def test_weights_that_are_absent_are_one_command_away(quick, tmp_path):
@@ -128,21 +122,15 @@ def test_the_wheel_with_windows_is_a_warning_since_it_overwrites_the_headless_on
     assert found.remedy.startswith("pip uninstall -y opencv-python-headless opencv-python && pip install -c ")
 
 
-def test_a_full_disk_and_no_git_are_told(quick):
+def test_a_full_disk_no_git_and_a_check_that_fails_are_told(quick):
     quick.setattr(module.shutil, "disk_usage", lambda path: SimpleNamespace(free=1e8))
     quick.setattr(module.shutil, "which", lambda program: None)
     findings = examine()
     assert named(findings, "disk").state == "warning"
     assert named(findings, "git").state == "missing"
-
-
-def test_a_check_that_fails_is_a_finding(quick):
-    def broken(*arguments):
-        raise RuntimeError("odd\nmachine")
-
-    quick.setattr(module.shutil, "disk_usage", broken)
+    quick.setattr(module.shutil, "disk_usage", lambda path: {}["odd\nmachine"])
     found = named(examine(), "disk")
-    assert (found.state, found.found) == ("warning", "could not be looked at: RuntimeError: odd machine")
+    assert (found.state, found.found) == ("warning", "could not be looked at: KeyError: 'odd\\nmachine'")
 
 
 def test_what_hangs_is_cut_off_and_what_crashes_is_told():

@@ -21,6 +21,8 @@ name: ours
 version: 1
 panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-7], distance: 0.0118518518, bits: 8, \
 pupil: 0.8, region: 0.8}
+laser: {callable: 'evil.py:run'}
+slm: {driver: monitor, name: x, resolution: [128, 128]}
 """
 STUDY = """\
 title: Moved
@@ -84,7 +86,7 @@ def test_a_session_with_its_bench_file_imports_anywhere(tmp_path: Path, monkeypa
     assert "table.csv" in said
 
 
-def test_what_the_study_needs_and_the_session_does_not_hold_is_named_in_one_line(
+def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_holograms_are_those_of_the_export(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = moved(tmp_path, monkeypatch, OWN)
@@ -94,28 +96,17 @@ def test_what_the_study_needs_and_the_session_does_not_hold_is_named_in_one_line
     assert "benches" not in failure
     assert "\n" not in failure
 
-
-def test_holograms_are_those_of_the_export_even_where_version_metrics_and_folders_are_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    session = moved(tmp_path, monkeypatch, OWN)
     lay_out(tmp_path / "mine", OWN)
     monkeypatch.chdir(tmp_path / "mine")
+    without = shutil.copytree(session, tmp_path / "without")
+    shutil.rmtree(without / "report")
+    _, failure = run("session", "import", without, "--study", "study.yaml")
+    assert "report/solved lacks those" in failure
+    assert "\n" not in failure
+    assert read_manifest(without).rounds == 1  # no new photographs are asked for
+
     monkeypatch.setattr("holobench_eval.study.identity.HARNESS", "another version")
     said, failure = run("session", "import", session, "--study", "study.yaml")
     assert not failure
     assert "table.csv" in said
-    assert read_manifest(session).rounds == 1
-
-
-def test_a_session_without_its_phases_says_so_and_asks_for_no_new_photographs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    session = moved(tmp_path, monkeypatch, OWN)
-    lay_out(tmp_path / "mine", OWN)
-    monkeypatch.chdir(tmp_path / "mine")
-    shutil.rmtree(session / "report")
-    _, failure = run("session", "import", session, "--study", "study.yaml")
-    assert "report/solved lacks those" in failure
-    assert "\n" not in failure
     assert read_manifest(session).rounds == 1

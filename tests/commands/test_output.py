@@ -12,13 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from holobench_eval.commands import _plain
-from holobench_eval.commands.output import (
-    MOST_REASONS,
-    console,
-    print_answer,
-    print_headline,
-    print_holes,
-)
+from holobench_eval.commands.output import MOST_REASONS, console, print_answer, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import kind_of
 from tests.support.synthetic_study import cell, layout, record, study

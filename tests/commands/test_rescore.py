@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -52,16 +53,23 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None
     return added
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a study and its report."""
+    config = tmp_path_factory.mktemp("finished") / "study.yaml"
+    config.write_text(PICTURE)
+    outcome = compute(config)
+    build_report(load_study(config), outcome.records, config.parent / "out", outcome.provenance)
+    return config.parent
+
+
 @pytest.fixture
-def report(tmp_path: Path, add: Callable[[int], None]) -> Path:
+def report(finished: Path, tmp_path: Path, add: Callable[[int], None]) -> Path:
     """The folder of a finished study, whose config has named a metric more since."""
     add(1)
-    config = tmp_path / "study.yaml"
-    config.write_text(PICTURE)
-    outcome, folder = compute(config), tmp_path / "out"
-    build_report(load_study(config), outcome.records, folder, outcome.provenance)
-    config.write_text(PICTURE.replace(ONE, BOTH))
-    return folder
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "study.yaml").write_text(PICTURE.replace(ONE, BOTH))
+    return tmp_path / "out"
 
 
 def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report: Path) -> None:
@@ -77,6 +85,9 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
     assert after[new].notna().all()
     pd.testing.assert_frame_equal(after[list(before)], before)
     assert problems_in(report) == (1, [])
+    store = Store(report)  # which has one record and one capture for each cell
+    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in plan(load_study(config)).cells}
+    assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
 
 
 def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> None:
@@ -91,10 +102,7 @@ def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> No
 
 def test_a_metric_that_the_study_does_not_have_is_refused_with_the_nearest(report: Path) -> None:
     _, failure = rescored(report.parent / "study.yaml", "--output", report, "--metric", "psnt")
-    assert (
-        failure
-        == "--metric psnt: the study has no such metric; did you mean 'psnr'? allowed: match, peak_error, psnr, refine"
-    )
+    assert failure.startswith("--metric psnt: the study has no such metric; did you mean 'psnr'? allowed: match, peak")
 
 
 def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(
@@ -127,16 +135,13 @@ def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_aga
     rescored(config, "--output", report)
     add(2)
     _, problems = problems_in(report)
-    assert problems == [
-        f"{report}: '{NAME}' was of version v2, 1, is now of v2, 2; score its captures again",
-    ]
+    assert problems == [f"{report}: '{NAME}' was of version v2, 1, is now of v2, 2; score its captures again"]
     rescored(config, "--output", report)
     assert problems_in(report) == (1, [])
 
 
-@pytest.mark.parametrize("kept", [True, False])
 def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of_a_metric(
-    tmp_path: Path, add: Callable[[int], None], monkeypatch: pytest.MonkeyPatch, kept: bool
+    tmp_path: Path, add: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     add(1)
     session = sessions.moved(tmp_path, monkeypatch, sessions.STUDY.replace("[psnr]", f"[psnr, {NAME}]"))
@@ -148,26 +153,16 @@ def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of
         return photograph(self, *args, **named)
 
     monkeypatch.setattr(RealBench, "photograph", photographed)
-    store = Store(session / "report")
-    for file in store.folder.glob("*.npy") if not kept else ():
-        file.unlink()
-    add(2)
-    _, failure = sessions.run("session", "import", session)
-    assert not failure
-    assert photographs == []
-    assert read_manifest(session).rounds == 1
-    table = pd.read_csv(session / "report" / "records.csv").set_index("method")
-    assert table.filter(like="psnr_linear").loc["double_phase"].notna().all()
-    assert table.filter(like=COLUMN).loc["double_phase"].notna().item() == kept
-
-
-def test_what_is_scored_again_has_one_record_and_one_capture_for_each_cell(report: Path) -> None:
-    config = report.parent / "study.yaml"
-    rescored(config, "--output", report)
-    store = Store(report)
-    grid = plan(load_study(config))
-    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in grid.cells}
-    assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
+    for version, is_kept in ((2, True), (3, False)):
+        for file in Store(session / "report").folder.glob("*.npy") if not is_kept else ():
+            file.unlink()
+        add(version)
+        assert not sessions.run("session", "import", session)[1]
+        assert photographs == []
+        assert read_manifest(session).rounds == 1
+        table = pd.read_csv(session / "report" / "records.csv").set_index("method")
+        assert table.filter(like="psnr_linear").loc["double_phase"].notna().all()
+        assert table.filter(like=COLUMN).loc["double_phase"].notna().item() == is_kept
 
 
 def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_scored(

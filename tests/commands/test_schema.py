@@ -56,16 +56,12 @@ def fits(known: dict[str, Any]) -> Callable[[Any], bool]:
     return Draft202012Validator(known).is_valid
 
 
-def test_the_schema_is_one(known: dict[str, Any]) -> None:
+def test_the_schema_is_one_and_takes_every_config_that_ships(
+    known: dict[str, Any], fits: Callable[[Any], bool]
+) -> None:
     Draft202012Validator.check_schema(known)
-
-
-def test_every_config_that_ships_fits(fits: Callable[[Any], bool]) -> None:
     for path in sorted((ROOT / "configs").glob("*.yaml")):
         assert fits(load(path).data), path
-
-
-def test_the_full_config_of_the_tests_fits(fits: Callable[[Any], bool]) -> None:
     assert fits(parse("full.yaml", FULL).data)
 
 

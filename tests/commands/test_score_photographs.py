@@ -21,7 +21,7 @@ from holobench_eval.metrics import score
 from holobench_eval.optics.colour import srgb_decode, srgb_encode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
-from tests.support.photographed import Picture, captured, drowned, photograph, pose, save
+from tests.support.photographed import captured, drowned, photograph, pose, save
 from tests.support.reports import whole
 
 SHAPE = (160, 200)
@@ -48,57 +48,13 @@ def run(root: Path, values: str = "stored", **options: Any) -> tuple[str, str, p
     return whole(report), console.file.getvalue(), records[records["category"] == "given"]
 
 
-def gray(picture: Picture) -> Picture:
-    return np.repeat(picture.mean(axis=0, keepdims=True), 3, axis=0)
-
-
-def test_one_laser_in_a_colour_photograph_is_scored_on_its_channel_and_methods_keep_their_order(tmp_path):
-    target = gray(photograph("astronaut", SHAPE))
-    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
-    save(tmp_path / "targets" / "astronaut.png", target)
-    for method, contrast, noise in (("better", 0.3, 0.03), ("worse", 0.5, 0.0)):
-        draw = np.random.default_rng(2)
-        capture = captured(target, where, size, draw, contrast=contrast)
-        save(tmp_path / "captures" / f"plane of {method}" / "astronaut.png", capture[:1])
-        capture[1:] = np.abs(noise * draw.standard_normal(capture[1:].shape))
-        save(tmp_path / "captures" / method / "astronaut.png", capture)
-    text, terminal, records = run(tmp_path)
-    found = records[KEY].droplevel("target")
-    assert found["better"] > found["worse"] + 0.5
-    assert found["better"] == pytest.approx(found["plane of better"], abs=0.01)
-    for said in (text, terminal):
-        assert "Scored on the red channel alone" in said
-        assert "better/astronaut, worse/astronaut" in said
-
-
-def test_an_under_exposed_capture_has_no_score_and_is_never_the_best(tmp_path):
-    target = photograph("astronaut", SHAPE)
-    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
-    save(tmp_path / "targets" / "astronaut.png", target)
-    speckled = captured(target, where, size, np.random.default_rng(2), contrast=0.7)
-    save(tmp_path / "captures" / "speckled" / "astronaut.png", speckled)
-    clean = captured(target, where, size, np.random.default_rng(2), contrast=0)
-    save(tmp_path / "captures" / "dark" / "astronaut.png", clean * 3 / 255)
-    text, _, records = run(tmp_path)
-    assert records["state"].droplevel("target").to_dict() == {"dark": "failed", "speckled": "done"}
-    assert "under-exposed: its red channel has 4 levels" in text
-    assert records["reason"].str.contains("under-exposed").sum() == 1
-
-
-def test_raw_files_are_scored_as_linear_light_alone(tmp_path):
+def test_raw_files_are_linear_light_alone(tmp_path):
     pytest.importorskip("rawpy")
-    target = photograph("astronaut", SHAPE)[:1]
-    save(tmp_path / "targets" / "astronaut.png", target)
-    where, size = pose(np.random.default_rng(1), SHAPE, scale=1.3)
-    light = captured(np.repeat(target, 3, axis=0), where, size, np.random.default_rng(2), contrast=0.2)[0] ** 2.2
-    mosaic = np.full((2 * light.shape[0], 2 * light.shape[1]), 512, np.uint16)
-    mosaic[::2, ::2] += np.round(light * 15000).astype(np.uint16)
+    save(tmp_path / "targets" / "astronaut.png", photograph("astronaut", SHAPE)[:1])
     (tmp_path / "captures" / "m").mkdir(parents=True)
-    (tmp_path / "captures" / "m" / "astronaut.dng").write_bytes(bayer_dng(mosaic))
+    (tmp_path / "captures" / "m" / "astronaut.dng").write_bytes(bayer_dng(np.full((320, 400), 5000, np.uint16)))
     with pytest.raises(UserError, match="RAW files and floating point hold linear light; expected --values linear"):
         run(tmp_path)
-    _, _, records = run(tmp_path, values="linear")
-    assert records.loc[("m", "astronaut"), "psnr_linear_db"] > 18
 
 
 def cut_off(root: Path, **lacking: int) -> Path:
@@ -171,11 +127,8 @@ def test_aligned_captures_are_scored_as_they_are_however_speckled(tmp_path):
     levels = np.round(capture * 255).astype(np.float32) / 255
     expected = score(levels, np.round(target * 255) / 255, metrics=("psnr",), stored=True, refine=False, blur=())
     assert records.loc[("speckled", "astronaut"), KEY] == pytest.approx(expected["psnr_stored"], abs=1e-3)
-
-
-def test_aligned_and_visible_exclude_each_other(tmp_path):
     with pytest.raises(UserError, match="expected one of the two"):
-        run(cut_off(tmp_path, a=0), visible=True, aligned=True)
+        run(tmp_path, visible=True, aligned=True)
 
 
 def test_a_baseline_that_is_not_found_by_itself_is_scored_in_the_pose_of_its_session(tmp_path):
@@ -210,57 +163,31 @@ def test_a_target_that_no_capture_shows_has_no_floor_and_alone_it_makes_a_report
     assert list(pd.read_csv(tmp_path / "out" / "records.csv")["category"]) == ["given"]
 
 
-def in_one_pose(root: Path, **methods: Any) -> Path:
-    """Photographs of two targets by one camera; methods: changes of the displayed picture and the photograph."""
+def test_captures_that_are_mirrored_clipped_or_nearly_the_target_are_named_and_the_target_itself_is_refused(tmp_path):
     for name in ("astronaut", "coffee"):
         target = photograph(name, SHAPE)
-        save(root / "targets" / f"{name}.png", target)
-        for method, (shown, stored) in methods.items():
+        for method, shown, gain in (("fair", target, 0.9), ("clipped", target, 2), ("mirrored", target[..., ::-1], 1)):
             draw = np.random.default_rng(5)
             where, size = pose(draw, SHAPE, scale=1.3)
-            capture = captured(np.ascontiguousarray(shown(target)), where, size, draw, contrast=0.2)
-            save(root / "captures" / method / f"{name}.png", np.clip(stored(capture), 0, 1))
-    return root
-
-
-def same(picture: Picture) -> Picture:
-    return picture
-
-
-def test_the_target_itself_is_refused_and_what_is_nearly_it_is_named(tmp_path):
-    root = in_one_pose(tmp_path, honest=(same, same))
-    for name in ("astronaut", "coffee"):
-        target = photograph(name, SHAPE)
-        save(root / "captures" / "itself" / f"{name}.png", target)
-        save(root / "captures" / "padded" / f"{name}.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
-    text, terminal, records = run(root)
+            capture = captured(np.ascontiguousarray(shown), where, size, draw, contrast=0.2)
+            save(tmp_path / "captures" / method / f"{name}.png", np.clip(gain * capture, 0, 1))
+        for folder in ("targets", "captures/itself"):
+            save(tmp_path / folder / f"{name}.png", target)
+        save(tmp_path / "captures" / "padded" / f"{name}.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
+    text, terminal, records = run(tmp_path)
+    assert (records.drop("itself")["state"] == "done").all()
     assert (records.loc["itself", "state"] == "failed").all()
     assert records.loc["itself", "reason"].str.contains("is the target itself, value for value").all()
-    for said in (text, terminal):
-        names = "padded/astronaut, padded/coffee."
-        assert f"Nearly the target itself, which a photograph with sensor noise is not: {names}" in said
-
-
-def test_a_capture_that_is_mirrored_against_the_others_is_named(tmp_path):
-    root = in_one_pose(tmp_path, a=(same, same), b=(same, same), mirrored=(lambda picture: picture[..., ::-1], same))
-    text, terminal, records = run(root)
-    assert (records["state"] == "done").all()
-    for said in (text, terminal):
-        assert re.search(r"Mirrored against the other captures of \d+ x \d+ pixels", said)
-        assert "so: mirrored/astronaut, mirrored/coffee." in said
-    shutil.rmtree(root / "captures" / "mirrored")
-    assert "Mirrored" not in run(root)[1]
-
-
-def test_clipped_captures_are_named_with_their_share(tmp_path):
-    root = in_one_pose(tmp_path, fair=(same, lambda seen: 0.9 * seen), clipped=(same, lambda seen: 2 * seen))
-    text, terminal, records = run(root)
     share = records.loc[("clipped", "astronaut"), "saturated"]
     assert share > 0.05
     for said in (text, terminal):
+        names = "padded/astronaut, padded/coffee."
+        assert f"Nearly the target itself, which a photograph with sensor noise is not: {names}" in said
+        assert re.search(r"Mirrored against the other captures of \d+ x \d+ pixels", said)
+        assert "so: mirrored/astronaut, mirrored/coffee." in said
         assert "more than 0.1% of the scored samples at full scale: clipped/astronaut" in said
         assert f"clipped/astronaut {share:.2%}" in said
-    assert "fair/" not in terminal.partition("Clipped")[2]
+    assert "fair/" not in terminal
 
 
 def linear_counts(root: Path, black: int) -> None:
@@ -298,7 +225,7 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
         run(tmp_path / "black", "srgb", dark="4096")
 
 
-@pytest.mark.parametrize(("values", "coarse"), [("stored", 1), ("srgb", 1), ("linear", 16)])
+@pytest.mark.parametrize(("values", "coarse"), [("stored", 1), ("linear", 16)])
 def test_a_black_level_is_told_whatever_the_values_and_with_what_takes_it_off(tmp_path, values, coarse):
     linear_counts(tmp_path, 4096)
     for path in tmp_path.glob("captures/*/*.tif"):

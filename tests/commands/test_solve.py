@@ -70,12 +70,6 @@ def test_the_networks_of_the_clone_are_found_from_any_folder(tmp_path: Path, mon
     assert learned_folder(ARTIFACTS, grid) == ARTIFACTS
 
 
-def test_a_gray_picture_is_taken(picture: Path) -> None:
-    cv2.imwrite(str(picture), np.full((120, 120), 90, np.uint8))
-    solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
-    assert Path("out", "report.md").is_file()
-
-
 def test_a_display_of_one_laser_is_called_by_no_other_colour(picture: Path, capsys: pytest.CaptureFixture[str]) -> None:
     panel = "panel: {wavelengths: [532e-9]}"
     Path("one.yaml").write_text(f"name: one\nversion: 1\nseed: 1\ndescription: One.\nlike: leto-2020\n{panel}\n")
@@ -88,63 +82,38 @@ def test_a_display_of_one_laser_is_called_by_no_other_colour(picture: Path, caps
     assert not re.findall(r"\b(?:red|green|R/G/B)\b", written)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [("gone.png", None, "gone.png: no such file"), ("text.png", b"text", "text.png: not an image")],
-)
-def test_what_is_no_picture_is_refused_and_nothing_is_written(
-    picture: Path, name: str, content: bytes | None, message: str
-) -> None:
-    if content is not None:
-        Path(name).write_bytes(content)
-    with pytest.raises(UserError, match=message):
-        solve("double_phase", Path(name), output=Path("out"))
-    assert not Path("out").exists()
-
-
 def test_arguments_in_the_other_order_are_told(picture: Path) -> None:
     with pytest.raises(UserError, match=r"the picture comes second: holoeval solve METHODS my picture\.png"):
         solve(str(picture), Path("wirtinger"))
 
 
-def test_a_refused_method_leaves_the_study_of_the_report_that_is_there(picture: Path) -> None:
-    solve("double_phase", picture, display="ideal", panel=(128, 128), output=Path("out"))
-    study = Path("out/study.yaml").read_text()
-    with pytest.raises(UserError, match="out: holds the report of other methods"):
-        solve("wirtinker", picture, output=Path("out"))
-    assert Path("out/study.yaml").read_text() == study
-
-
 def test_a_report_of_other_methods_pictures_or_displays_stays(picture: Path) -> None:
     solve("double_phase", picture, display="ideal", panel=(128, 128))
-    cv2.imwrite(str(picture), np.full((120, 120, 3), 90, np.uint8))
+    cv2.imwrite(str(picture), np.full((120, 120), 90, np.uint8))
     for display in ("ideal", "leto-mild"):
         solve("double_phase", picture, display=display, panel=(128, 128))
     folders = [Path("holoeval-results", name) for name in ("my picture", "my picture-2", "my picture-3")]
-    reports = [(folder / "report.md").read_text() for folder in folders]
-    assert len(set(reports)) == 3
+    files = [folder / name for folder in folders for name in ("report.md", "study.yaml")]
+    texts = [file.read_text() for file in files]
+    assert len(set(texts)) == 6
     solve("double_phase", picture, display="ideal", panel=(128, 128))  # the second once more
     assert sorted(path.name for path in Path("holoeval-results").iterdir() if path.name != "solved") == [
         folder.name for folder in folders
     ]
-    with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
-        solve("gerchberg_saxton", picture, display="ideal", panel=(128, 128), output=folders[1])
-    assert [(folder / "report.md").read_text() for folder in folders] == reports
+    for method in ("gerchberg_saxton", "wirtinker"):
+        with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
+            solve(method, picture, display="ideal", panel=(128, 128), output=folders[1])
+    assert [file.read_text() for file in files] == texts
 
 
-def test_a_folder_holds_one_picture(picture: Path) -> None:
-    Path("out", "picture").mkdir(parents=True)
-    Path("out", "picture", "other.png").touch()
-    with pytest.raises(UserError, match=r"holds another other\.png; choose another --output"):
+@pytest.mark.parametrize("name", ["other.png", "my picture.png"])
+def test_a_folder_holds_one_picture_and_another_is_not_replaced(picture: Path, name: str) -> None:
+    kept = Path("out", "picture", name)
+    kept.parent.mkdir(parents=True)
+    kept.write_bytes(b"another")
+    with pytest.raises(UserError, match=rf"holds another {name}; choose another --output"):
         solve("double_phase", picture, output=Path("out"))
-
-
-def test_another_picture_of_the_same_name_is_not_replaced(picture: Path) -> None:
-    Path("out", "picture").mkdir(parents=True)
-    Path("out", "picture", picture.name).write_bytes(b"another")
-    with pytest.raises(UserError, match=r"holds another my picture\.png; choose another --output"):
-        solve("double_phase", picture, output=Path("out"))
-    assert Path("out", "picture", picture.name).read_bytes() == b"another"
+    assert kept.read_bytes() == b"another"
 
 
 def test_files_of_others_are_not_replaced(picture: Path) -> None:
@@ -159,28 +128,28 @@ def test_files_of_others_are_not_replaced(picture: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("methods", "changes", "message"),
+    ("methods", "name", "changes", "message"),
     [
-        ("wirtinker", {}, "unknown method 'wirtinker'"),
-        ("", {}, "methods"),
-        ("double_phase", {"panel": (20, 20)}, "panel"),
-        ("double_phase", {"display": "leto"}, "leto"),
-        ("phases", {}, "none of the files that it reads is there"),
+        ("wirtinker", "", {}, "unknown method 'wirtinker'"),
+        ("", "", {}, "methods"),
+        ("double_phase", "", {"panel": (20, 20)}, "panel"),
+        ("double_phase", "", {"display": "leto"}, "leto"),
+        ("phases", "", {}, "none of the files that it reads is there"),
+        ("double_phase", "gone.png", {}, "gone.png: no such file"),
+        ("double_phase", "text.png", {}, "text.png: not an image"),
+        ("double_phase", "picture", {}, "not a picture by its name"),
+        ("double_phase", ".hidden.png", {}, "not a picture by its name"),
+        ("my picture.png", "wirtinger", {}, r"the picture comes second: holoeval solve METHODS my picture\.png"),
     ],
 )
 def test_what_is_refused_is_said_of_the_command_and_leaves_nothing(
-    picture: Path, methods: str, changes: dict[str, Any], message: str, capsys: pytest.CaptureFixture[str]
+    picture: Path, methods: str, name: str, changes: dict[str, Any], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    for other in ("picture", ".hidden.png"):
+        Path(other).write_bytes(picture.read_bytes())
+    Path("text.png").write_text("text")
     with pytest.raises(UserError, match=message) as refused:
-        solve(methods, picture, output=Path("out"), **changes)
+        solve(methods, Path(name or picture), output=Path("out"), **changes)
     assert "study.yaml" not in str(refused.value)
     assert not Path("out").exists()
     assert capsys.readouterr().out == ""
-
-
-@pytest.mark.parametrize("name", ["picture", ".hidden.png"])
-def test_a_picture_whose_name_is_not_of_one_is_refused(picture: Path, name: str) -> None:
-    picture.rename(name)
-    with pytest.raises(UserError, match="not a picture by its name"):
-        solve("double_phase", Path(name), output=Path("out"))
-    assert not Path("out").exists()

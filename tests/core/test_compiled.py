@@ -15,21 +15,21 @@ def test_a_gradient_or_another_device_needs_the_uncompiled_form():
     assert not compiled.usable(torch.zeros(2, device="meta"))
 
 
-def test_without_numba_a_function_stays_as_it_is(monkeypatch: pytest.MonkeyPatch):
+def test_a_function_is_compiled_without_a_folder_for_a_cache_and_stays_as_it_is_without_numba(
+    monkeypatch: pytest.MonkeyPatch,
+):
     def double(x):
         return 2 * x
 
+    def refuse(cache=False, **options):  # as Numba does where it finds no folder for its cache
+        if cache:
+            raise RuntimeError("cannot cache function: no locator available")
+        return lambda function: "compiled each time"
+
     assert compiled.compiled(double) is not double
+    with monkeypatch.context() as without_folder:
+        without_folder.setattr(compiled, "_compile", refuse)
+        assert compiled.compiled(double) == "compiled each time"
     monkeypatch.setattr(compiled, "AVAILABLE", False)
     assert compiled.compiled(double) is double
     assert not compiled.usable()
-
-
-def test_without_a_folder_for_the_cache_a_function_is_compiled_each_time(monkeypatch: pytest.MonkeyPatch):
-    def refuse(cache=False, **options):
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return lambda function: "compiled"
-
-    monkeypatch.setattr(compiled, "_compile", refuse)
-    assert compiled.compiled(len) == "compiled"

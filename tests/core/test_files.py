@@ -53,19 +53,14 @@ def test_a_file_that_is_none_or_is_huge_is_refused_at_once(reader: str, kind: st
     assert ("larger than" if kind == "huge" else "a pipe or a device; expected a regular file") in str(caught.value)
 
 
-def test_a_file_that_was_read_is_closed(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"text")
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        read_text(tmp_path / "file", 6)
-    assert not said
-
-
-def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+def test_a_file_is_read_up_to_its_limit_and_closed(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes("a\r\né\n".encode())
-    assert read_regular(path, 6) == path.read_bytes()
-    assert read_text(path, 6) == "a\né\n"
+    with warnings.catch_warnings(record=True) as said:  # of files that stay open
+        warnings.simplefilter("always")
+        assert read_regular(path, 6) == path.read_bytes()
+        assert read_text(path, 6) == "a\né\n"
+    assert not said
     with pytest.raises(UserError, match="larger than"):
         read_regular(path, 5)
     path.write_bytes(b"a\xff")
@@ -84,7 +79,7 @@ def test_tensors_that_would_be_unpacked_to_more_than_the_file_are_refused(tmp_pa
         read_tensors(packed)
 
 
-@pytest.mark.parametrize("sign", ["\x1b[2J", "\x07", "\x9b1m", "\u202e"])
+@pytest.mark.parametrize("sign", ["\x1b[2J", "\u202e"])
 @pytest.mark.parametrize("column", ["label", "condition", "target", "reason"])
 def test_records_that_would_control_a_terminal_are_refused(column: str, sign: str, tmp_path: Path) -> None:
     folder = write_report(tmp_path, {("toy", "bench"): [None, 20.0]})

@@ -58,27 +58,21 @@ def after(calls: int, step: Callable[[Count], Tensor]) -> tuple[list[float], Cou
 RIGHT = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]
 
 
-def test_on_the_cpu_it_is_the_step_itself() -> None:
-    count = Count()
-    step = count.in_place
-    assert repeated(step, CPU) is step
-    assert not is_recorded(CPU)
-
-
 def test_a_step_is_recorded_once_and_each_call_is_one_step() -> None:
     with fake_device() as cuda:
         returned, count = after(7, Count.in_place)
     assert returned == RIGHT
     assert (cuda.watches, cuda.records, cuda.replays) == (1, 1, 7 - WARM_UP - 1)
+    assert cuda.waits == [("own", "usual"), ("usual", "own")] * (WARM_UP + 1)  # around every run on another stream
     assert count.calls == WARM_UP + 2  # Python has run for the last time when the step was recorded
 
 
 @pytest.mark.parametrize("step", [Count.branching, Count.masked, Count.from_numbers])
 def test_a_step_that_waits_for_the_device_runs_as_it_is(step: Callable[[Count], Tensor]) -> None:
     with fake_device() as cuda:
-        returned, _ = after(7, step)
-    assert returned == RIGHT
+        assert after(7, step)[0] == RIGHT
     assert (cuda.watches, cuda.records) == (1, 0)
+    assert cuda.waits == [("own", "usual"), ("usual", "own")] * (WARM_UP + 1)
     assert cuda.get_sync_debug_mode() == 0
 
 
@@ -89,13 +83,6 @@ def test_a_step_that_cannot_be_recorded_runs_as_it_is() -> None:
     assert cuda.current is cuda.usual
 
 
-@pytest.mark.parametrize("step", [Count.in_place, Count.branching])
-def test_streams_wait_for_each_other_around_every_run_on_another_one(step: Callable[[Count], Tensor]) -> None:
-    with fake_device() as cuda:
-        after(7, step)
-    assert cuda.waits == [("own", "usual"), ("usual", "own")] * (WARM_UP + 1)
-
-
 @pytest.mark.parametrize("step", [Count.elsewhere, Count.in_numpy])
 def test_the_fake_device_shows_what_a_graph_would_not_repeat(step: Callable[[Count], Tensor]) -> None:
     """A result that is put elsewhere, and work that torch does not do."""
@@ -103,10 +90,12 @@ def test_the_fake_device_shows_what_a_graph_would_not_repeat(step: Callable[[Cou
         assert after(7, step)[0] != RIGHT
 
 
-def test_an_error_of_the_step_is_raised() -> None:
+def test_on_the_cpu_it_is_the_step_itself_and_elsewhere_an_error_of_the_step_is_raised() -> None:
     def step() -> None:
         raise ValueError("no light")
 
+    assert repeated(step, CPU) is step
+    assert not is_recorded(CPU)
     with fake_device(), pytest.raises(ValueError, match="no light"):
         repeated(step, CPU)()
 

@@ -29,24 +29,8 @@ class Table:
     ("data", "where", "of_a_plug_in", "of_a_file"),
     [
         ({}, ("name",), "table 'x' needs the parameter 'name'", "missing key 'name' in the document"),
-        (
-            {"name": 3},
-            ("name",),
-            "table 'x': parameter 'name': input should be a valid string, got 3",
-            "name should be a",
-        ),
-        (
-            {"nam": "a"},
-            ("nam",),
-            "table 'x' has no parameter 'nam'; did you mean 'name'?",
-            "unknown key 'nam' in the do",
-        ),
-        (
-            {"digest": "a"},
-            ("digest",),
-            "table 'x' has no parameter 'digest'; allowed: lens, lenses, name",
-            "unknown key",
-        ),
+        ({"nam": "a"}, ("nam",), "table 'x' has no parameter 'nam'; did you mean 'name'?", "unknown key 'nam' in the"),
+        ({"digest": "a"}, ("digest",), "table 'x' has no parameter 'digest'; allowed: lens, lenses, n", "unknown key"),
         (
             {"name": "a", "lens": {"fokus": 1.0}},
             ("lens", "fokus"),
@@ -54,16 +38,10 @@ class Table:
             "unknown key 'fokus' in lens; did you mean 'focus'?",
         ),
         (
-            {"name": "a", "lenses": [{}, {"fokus": 1.0}]},
-            ("lenses", 1, "fokus"),
-            "table 'x' has no parameter 'lenses.1.fokus'",
-            "unknown key 'fokus' in lenses[1]",
-        ),
-        (
-            {"name": "a", "lens": {"size": [1]}},
-            ("lens", "size", 1),
-            "table 'x' needs the parameter 'lens.size.1'",
-            "lens.size has too few values: [1]",
+            {"name": "a", "lenses": [{}, {"size": [1]}]},
+            ("lenses", 1, "size", 1),
+            "table 'x' needs the parameter 'lenses.1.size.1'",
+            "lenses[1].size has too few values: [1]",
         ),
         (
             {"name": "a", "lens": {"focus": 0}},
@@ -82,12 +60,9 @@ def test_a_fault_is_one_line_with_its_place_in_the_words_of_its_owner(data, wher
         assert caught.value.at_key == ("has no parameter" in of_a_plug_in)
 
 
-def test_nested_dataclasses_are_built():
+def test_nested_dataclasses_are_built_and_a_value_that_json_does_not_have_is_refused():
     given = {"name": "a", "lens": {"focus": 2.0}, "lenses": [{"size": [1, 2]}]}
     assert checked(Table, given) == Table("a", Lens(2.0), (Lens(size=(1, 2)),))
-
-
-def test_a_value_that_json_does_not_have_is_refused():
     with pytest.raises(UserError, match=r"table 'x': .*set"):
         checked(Table, {"name": {1, 2}}, "table 'x'")
 

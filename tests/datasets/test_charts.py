@@ -23,13 +23,8 @@ def chart(name: str, shape: tuple[int, int] = (160, 160)) -> torch.Tensor:
     return Charts(names=(name,)).load(name, shape)[1]
 
 
-def test_the_default_is_every_chart():
-    assert Charts().items() == list(CHARTS)
-    assert Charts(names=("usaf_bars", "tv_lines")).items() == ["usaf_bars", "tv_lines"]
-
-
 @pytest.mark.parametrize("name", list(CHARTS))
-@pytest.mark.parametrize("shape", [(64, 64), (160, 160), (160, 256), (256, 160), (161, 203)])
+@pytest.mark.parametrize("shape", [(64, 64), (160, 256), (161, 203)])
 def test_charts_reach_black_and_white_and_have_three_equal_channels(name, shape):
     target = Charts().load(name, shape)
     assert float(target.min()) < 0.01
@@ -54,8 +49,7 @@ def test_tv_lines_go_from_one_pixel_to_a_thirtieth_in_both_directions():
 
 
 def test_tv_lines_stay_inside_on_a_wide_and_on_a_tall_region():
-    wide, tall = chart("tv_lines", (160, 284)), chart("tv_lines", (284, 160))
-    for image in (wide, tall):
+    for image in (chart("tv_lines", (160, 284)), chart("tv_lines", (284, 160))):
         assert float(torch.cat([image[0], image[-1], image[:, 0], image[:, -1]]).max()) == 0.0
         assert 0.3 < float(image.mean()) < 0.5
 
@@ -65,12 +59,8 @@ def test_the_star_has_36_spokes_and_gives_half_the_light_in_its_disc():
     angles = torch.linspace(0, 2 * torch.pi, 7201)[:-1] + torch.pi / 36
     ring = image[(200 + 150 * angles.sin()).long(), (200 + 150 * angles.cos()).long()]
     assert len(runs(ring)) == 36
+    assert torch.allclose(image[199:201, 199:201], torch.full((2, 2), 0.5), atol=0.15)  # gray, not aliased
     assert float(image.sum()) == pytest.approx(0.5 * torch.pi * 190**2, rel=0.005)
-
-
-def test_the_centre_of_the_star_is_gray_not_aliased():
-    centre = chart("siemens_star")[79:81, 79:81]
-    assert torch.allclose(centre, torch.full_like(centre, 0.5), atol=0.15)
 
 
 @pytest.mark.parametrize("shape", [(200, 300), (300, 200)])
@@ -125,18 +115,15 @@ def test_a_larger_chart_averages_to_the_smaller_one(name):
     assert float((small - averaged).abs().mean()) < 0.01
 
 
-def test_a_changed_drawing_changes_its_digest(monkeypatch):
-    before = Charts().digest("tv_lines")
-    monkeypatch.setattr(charts, "VERSION", charts.VERSION + 1)
-    assert Charts().digest("tv_lines") != before
-
-
-def test_the_drawings_are_those_of_this_version():
+def test_the_drawings_are_those_of_this_version(monkeypatch):
     """A drawing that changes fails here: raise VERSION with it, so that old records are not taken for new ones."""
     assert charts.VERSION == 1
     weights = torch.linspace(0.0, 1.0, 96)[:, None] * torch.linspace(1.0, 2.0, 128)
     found = {name: float((chart(name, (96, 128)) * weights).mean()) for name in CHARTS}
     assert found == pytest.approx(GOLDEN, rel=2e-3)
+    before = Charts().digest("tv_lines")
+    monkeypatch.setattr(charts, "VERSION", charts.VERSION + 1)
+    assert Charts().digest("tv_lines") != before
 
 
 def test_a_region_too_small_for_a_chart_is_refused():

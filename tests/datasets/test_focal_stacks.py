@@ -96,29 +96,21 @@ def test_a_slope_has_no_seams_between_its_layers():
 
 
 def test_a_stack_is_the_same_picture_on_a_larger_panel():
-    stacks = FocalStacks()
-    small, large = stacks.load("shapes@0mm", SHAPE), stacks.load("shapes@0mm", (192, 192))
-    halved = torch.nn.functional.avg_pool2d(large, 2)
-    assert (halved - small).abs().mean() < 0.02
-    assert stacks.load("shapes@0mm", (64, 96)).shape == (3, 64, 96)
+    small, large = (FocalStacks().load("shapes@0mm", shape) for shape in (SHAPE, (192, 192)))
+    assert (torch.nn.functional.avg_pool2d(large, 2) - small).abs().mean() < 0.02
 
 
-def test_generated_scenes_differ_by_their_number_alone():
-    stacks = FocalStacks(("shapes", "shapes-2"), (0.0,))
-    first, second = (stacks.load(item, SHAPE) for item in stacks.items())
+def test_an_item_tells_its_scene_and_its_plane_and_scenes_differ_by_their_number_alone():
+    stacks = FocalStacks(("shapes", "shapes-2"), (-1.5, 0.0))
+    assert stacks.items() == ["shapes@-1.5mm", "shapes@0mm", "shapes-2@-1.5mm", "shapes-2@0mm"]
+    assert (stacks.scene("shapes-2@-1.5mm"), stacks.plane("shapes-2@-1.5mm")) == ("shapes-2", -1.5)
+    first, second = (stacks.load(f"{scene}@0mm", SHAPE) for scene in ("shapes", "shapes-2"))
     assert (first - second).abs().mean() > 0.05
     assert torch.equal(first, FocalStacks(planes=(0.0,)).load("shapes@0mm", SHAPE))
 
 
-def test_an_item_tells_its_scene_and_its_plane():
-    stacks = FocalStacks(("shapes", "shapes-2"), (-1.5, 0.0))
-    assert stacks.items() == ["shapes@-1.5mm", "shapes@0mm", "shapes-2@-1.5mm", "shapes-2@0mm"]
-    assert (stacks.scene("shapes-2@-1.5mm"), stacks.plane("shapes-2@-1.5mm")) == ("shapes-2", -1.5)
-
-
 def test_a_plane_where_nothing_is_in_focus_is_refused():
-    message = refused(FocalStacks(planes=(5.0,)).items)
-    assert message == ("scene 'shapes' has nothing within 0.5 mm of the plane at 5 mm; its depth goes from -2 to 2 mm")
+    assert "nothing within 0.5 mm of the plane at 5 mm" in refused(FocalStacks(planes=(5.0,)).items)
 
 
 def test_a_motorcycle_that_is_not_there_is_said_to_be_missing(monkeypatch, tmp_path):
@@ -154,13 +146,8 @@ def test_a_folder_with_an_image_and_its_depth_is_a_scene(tmp_path, kind):
     assert near[:, 42:].all()
     seen = stacks.load("room@2mm", (60, 80))
     assert detail(seen, near) > 5 * detail(seen, ~near)
-
-
-def test_another_depth_is_another_target(tmp_path):
-    depth = np.zeros((60, 80), np.uint8)
-    depth[:, 40:] = 255
-    before = write_scene(tmp_path / "room", depth).digest("room@2mm")
-    depth[:, 30:] = 255
+    before = stacks.digest("room@2mm")
+    depth[:, 30:] = np.iinfo(kind).max
     assert write_scene(tmp_path / "room", depth).digest("room@2mm") != before
 
 

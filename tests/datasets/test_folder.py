@@ -47,11 +47,13 @@ def pinned(place: Path, *lines: str) -> Folder:
     return Folder(str(place), manifest=str(manifest))
 
 
-def test_items_are_the_images_of_the_folder_itself_by_name(pictures):
+def test_items_are_the_images_of_the_folder_itself_by_name(pictures, monkeypatch):
     (pictures / "README.txt").write_text("not an image")
     save(pictures / ".hidden.png")
     assert Folder(str(pictures)).items() == ["0001.PNG", "0002.png"]
     assert Folder(str(pictures), count=1).items() == ["0001.PNG"]
+    monkeypatch.chdir(pictures.parent)
+    assert Folder("pictures").items() == ["0001.PNG", "0002.png"]
 
 
 def test_pixels_are_those_of_the_file_in_linear_light(pictures):
@@ -60,55 +62,42 @@ def test_pixels_are_those_of_the_file_in_linear_light(pictures):
     assert torch.allclose(Folder(str(pictures)).load("0002.png", (10, 16)), wanted, atol=1e-6)
 
 
-def test_a_relative_path_is_taken_from_the_working_directory(pictures, monkeypatch):
-    monkeypatch.chdir(pictures.parent)
-    assert Folder("pictures").items() == ["0001.PNG", "0002.png"]
-
-
-def test_the_digest_is_that_of_the_file_and_changes_with_it(pictures):
+def test_the_digest_is_that_of_the_file_and_an_unchanged_file_is_decoded_once(pictures, monkeypatch):
     dataset = Folder(str(pictures))
     before = dataset.digest("0002.png")
     assert before == sha256(pictures / "0002.png")
     save(pictures / "0002.png", seed=9)
     os.utime(pictures / "0002.png", ns=(1, 1))
     assert dataset.digest("0002.png") == sha256(pictures / "0002.png") != before
-
-
-def test_an_unchanged_file_is_decoded_once(pictures, monkeypatch):
-    dataset = Folder(str(pictures))
     dataset.items()
     monkeypatch.setattr(folder, "decode", None)
     assert dataset.items() == ["0001.PNG", "0002.png"]
 
 
-def test_a_missing_or_empty_folder_is_one_line(tmp_path):
-    assert "no such folder" in refusal(Folder(str(tmp_path / "nowhere")))
-    assert "no images" in refusal(Folder(str(tmp_path)))
-    assert "not a folder" in refusal(Folder(str(save(tmp_path / "file.png"))))
-
-
 def test_a_message_says_where_a_relative_path_was_looked_for(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    assert "no images" in refusal(Folder(str(tmp_path)))
     looked = f"in the working directory {Path.cwd()}, where paths of images start; "
     assert refusal(Folder("my/images")).startswith(f"my/images: no such folder {looked}dataset 'folder' needs")
     save(tmp_path / "my" / "file.png")
     assert refusal(Folder("my", manifest="none")).startswith(f"none: no such manifest {looked}write one with")
-    for line in (refusal(Folder(str(tmp_path / "nowhere"))), refusal(Folder("my/file.png"))):
-        assert "working directory" not in line
+    for folder_, line in ((str(tmp_path / "nowhere"), "no such folder"), ("my/file.png", "not a folder")):
+        assert line in refusal(Folder(folder_))
+        assert "working directory" not in refusal(Folder(folder_))
 
 
-def test_one_bad_image_stops_before_anything_is_computed(pictures):
+def test_one_bad_image_a_pipe_or_an_unprintable_name_stops_before_anything_is_computed(pictures):
+    os.mkfifo(pictures / "pipe.png")
+    assert "not a regular file" in refusal(Folder(str(pictures)))
+    (pictures / "pipe.png").unlink()
+    save(pictures / "a\nb.png")
+    assert "cannot be printed" in refusal(Folder(str(pictures)))
+    (pictures / "a\nb.png").unlink()
     content = (pictures / "0002.png").read_bytes()
     (pictures / "0002.png").write_bytes(content[: len(content) // 2])
     line = refusal(Folder(str(pictures)))
     assert line.startswith(f"{pictures / '0002.png'}: truncated or damaged")
     assert "expected an 8-bit RGB image in sRGB" in line
-
-
-def test_gray_images_are_taken_only_when_asked_for(pictures):
-    save(pictures / "0003.png", mode="L")
-    assert "gray: true" in refusal(Folder(str(pictures)))
-    assert "0003.png" in Folder(str(pictures), gray=True).items()
 
 
 def test_a_message_names_the_gray_images_and_says_how_to_take_them(pictures):
@@ -117,6 +106,7 @@ def test_a_message_names_the_gray_images_and_says_how_to_take_them(pictures):
     line = refusal(Folder(str(pictures)))
     assert "7 of 9 images have one channel (0003.png, 0004.png, 0005.png, 0006.png, 0007.png and 2 more)" in line
     assert "gray: true in params" in line
+    assert "0003.png" in Folder(str(pictures), gray=True).items()
 
 
 def test_a_manifest_chooses_and_pins_the_images(pictures):
@@ -126,7 +116,7 @@ def test_a_manifest_chooses_and_pins_the_images(pictures):
     assert dataset.load("sub/deep.png", (8, 8)).shape == (3, 8, 8)
 
 
-@pytest.mark.parametrize("form", ["{sum} *{name}", "{sum}  ./{name}", "{upper}  {name}", "{sum}  {name}\r"])
+@pytest.mark.parametrize("form", ["{sum} *{name}", "{upper}  ./{name}", "{sum}  {name}\r"])
 def test_forms_that_sha256sum_and_editors_write_are_read(pictures, form):
     digest = sha256(pictures / "0002.png")
     dataset = pinned(pictures, form.format(sum=digest, upper=digest.upper(), name="0002.png"), "")
@@ -142,11 +132,7 @@ def test_a_file_that_differs_from_its_manifest_is_refused_also_when_loaded(pictu
         dataset.load("0002.png", (8, 8))
 
 
-def test_a_file_that_a_manifest_lists_must_be_there(pictures):
-    assert "no such file, but" in refusal(pinned(pictures, f"{'0' * 64}  gone.png"))
-
-
-@pytest.mark.parametrize("name", ["../secret.png", "/etc/hostname", "sub/../../secret.png", "./../secret.png"])
+@pytest.mark.parametrize("name", ["../secret.png", "/etc/hostname", "sub/../../secret.png"])
 def test_a_manifest_cannot_name_a_file_outside_its_folder(pictures, name):
     digest = sha256(save(pictures.parent / "secret.png"))
     assert "leaves the folder" in refusal(pinned(pictures, f"{digest}  {name}"))
@@ -172,11 +158,11 @@ def test_a_link_within_the_folder_and_a_link_to_the_folder_are_fine(pictures):
     [
         (["nonsense"], ":1: not a line of sha256sum"),
         (["", "0123  a.png"], ":2: not a line of sha256sum"),
-        ([f"\\{'0' * 64}  a\\nb.png"], ":1: not a line of sha256sum"),
         ([f"{'0' * 64}  a\\b.png"], "cannot be used"),
         ([f"{'0' * 64}  a\x1b[2J.png"], "cannot be used"),
         ([f"{'0' * 64}  a.png", f"{'1' * 64}  ./a.png"], ":2: 'a.png' is listed twice"),
         ([], "the manifest is empty"),
+        ([f"{'0' * 64}  gone.png"], "no such file, but"),
     ],
 )
 def test_a_broken_manifest_is_one_line_with_its_number(pictures, lines, message):
@@ -196,11 +182,3 @@ def test_only_items_can_be_loaded(pictures, item):
     (pictures / "README.txt").write_text("not an image")
     with pytest.raises(UserError):
         Folder(str(pictures)).load(item, (8, 8))
-
-
-def test_pipes_and_unprintable_names_are_refused_without_waiting(pictures):
-    os.mkfifo(pictures / "pipe.png")
-    assert "not a regular file" in refusal(Folder(str(pictures)))
-    (pictures / "pipe.png").unlink()
-    save(pictures / "a\nb.png")
-    assert "cannot be printed" in refusal(Folder(str(pictures)))

@@ -49,32 +49,22 @@ def refusal(content: bytes, **options) -> str:
 RGB = Image.fromarray(PIXELS)
 
 
-@pytest.mark.parametrize("kind", ["PNG", "TIFF", "BMP"])
+@pytest.mark.parametrize("kind", ["PNG", "BMP"])
 def test_eight_bit_rgb_is_decoded_to_linear_light(kind):
     found = decode(encoded(RGB, kind), "x")
     assert torch.allclose(found, linear(PIXELS).permute(2, 0, 1), atol=1e-6)
 
 
-@pytest.mark.parametrize(("kind", "options"), [("JPEG", {"quality": 95}), ("WEBP", {"lossless": True})])
-def test_other_formats_are_read(kind, options):
-    assert decode(encoded(RGB, kind, **options), "x").shape == (3, 12, 20)
-
-
 KINDS = {
     "one channel": (encoded(RGB.convert("L")), "one-channel"),
     "alpha": (encoded(Image.merge("RGBA", [*RGB.split(), RGB.getchannel(0)])), "alpha that is not opaque"),
-    "gray with alpha": (encoded(Image.merge("LA", RGB.split()[:2])), "one-channel"),
     "palette": (encoded(RGB.convert("P")), "palette"),
     "one bit": (encoded(RGB.convert("1")), "1-bit"),
     "CMYK": (encoded(RGB.convert("CMYK"), "JPEG"), "CMYK"),
     "floating point": (encoded(RGB.convert("F"), "TIFF"), "floating-point"),
     "transparent colour": (encoded(RGB, transparency=(0, 0, 0)), "transparent colour"),
     "16-bit": (deep(DEEP), "16-bit"),
-    "16-bit TIFF": (deep(DEEP, ".tiff"), "16-bit"),
     "two frames": (encoded(RGB, save_all=True, append_images=[ImageOps.mirror(RGB)]), "2 frames"),
-    "GIF": (encoded(RGB.convert("P"), "GIF"), "palette"),
-    "text": (b"not an image at all", "not an image"),
-    "nothing": (b"", "not an image"),
     "PostScript": (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n", "not an image"),
 }
 
@@ -86,41 +76,23 @@ def test_every_other_kind_is_refused_by_its_name(kind):
 
 
 @pytest.mark.parametrize("kind", ["PNG", "JPEG", "TIFF", "BMP", "WEBP"])
-@pytest.mark.parametrize("kept", [0.05, 0.5, 0.9])
+@pytest.mark.parametrize("kept", [0.05, 0.9])
 def test_a_truncated_file_is_refused(kind, kept):
     smooth = Image.fromarray(np.random.default_rng(1).integers(0, 256, (80, 80, 3), dtype=np.uint8))
     content = encoded(smooth, kind)
     refusal(content[: int(len(content) * kept)])
 
 
-def test_a_truncated_16_bit_file_is_refused():
-    content = deep(np.random.default_rng(1).integers(0, 65536, (80, 80, 3), dtype=np.uint16))
-    assert "truncated" in refusal(content[: len(content) // 2], sixteen_bit="srgb")
-
-
 def chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-@pytest.mark.parametrize("size", [(1, 64_000_000), (7999, 8000), (9000, 9000), (12000, 12000), (60000, 60000)])
+@pytest.mark.parametrize("size", [(1, 64_000_000), (7999, 8000), (60000, 60000)])
 def test_a_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(size, monkeypatch):
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None if size == (60000, 60000) else Image.MAX_IMAGE_PIXELS)
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0))
     content = b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
     assert "million" in refusal(content)
-
-
-@pytest.mark.parametrize(("rows", "bits", "kind"), [(31, 8, 2), (31, 16, 2), (31, 8, 0), (31, 16, 0)])
-def test_a_png_that_ends_before_its_last_row_is_refused_though_its_checksums_fit(rows, bits, kind):
-    options = {"gray": True, "sixteen_bit": "linear"}
-
-    def png(held: int) -> bytes:
-        header = chunk(b"IHDR", struct.pack(">IIBBBBB", 24, 32, bits, kind, 0, 0, 0))
-        pixels = zlib.compress(bytes(held * (1 + 24 * (bits // 8) * (3 if kind else 1))))
-        return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", pixels) + chunk(b"IEND", b"")
-
-    assert decode(png(32), "whole.png", **options).shape == (3, 32, 24)
-    assert "rows of the PNG are missing" in refusal(png(rows), **options)
 
 
 def test_gray_is_replicated_when_it_is_asked_for():
@@ -141,19 +113,14 @@ def test_16_bit_levels_keep_their_precision_as_srgb_or_as_linear_light(suffix):
 
 
 def test_16_bit_gray_needs_both_choices():
-    content = deep(DEEP[..., 0])
+    exif = Image.Exif()
+    exif[274] = 6  # stored on its side
+    content = encoded(Image.fromarray(DEEP[..., 0]), "TIFF", exif=exif)
     assert "one-channel" in refusal(content, sixteen_bit="linear")
     assert "16-bit" in refusal(content, gray=True)
     found = decode(content, "x", gray=True, sixteen_bit="linear")
-    assert torch.allclose(found, torch.from_numpy(DEEP[..., 0] / 65535).float().expand(3, -1, -1), atol=1e-7)
-
-
-def test_the_exif_orientation_of_16_bits_is_applied():
-    exif = Image.Exif()
-    exif[274] = 6
-    turned = encoded(Image.fromarray(DEEP[..., 0]), "TIFF", exif=exif)
     wanted = torch.from_numpy(np.rot90(DEEP[..., 0], 3) / 65535).float().expand(3, -1, -1)
-    assert torch.allclose(decode(turned, "x", gray=True, sixteen_bit="linear"), wanted, atol=1e-7)
+    assert torch.allclose(found, wanted, atol=1e-7)
 
 
 def test_an_srgb_profile_is_taken_and_another_is_refused():

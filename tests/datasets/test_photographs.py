@@ -30,13 +30,6 @@ def test_pixels_are_those_of_skimage_in_linear_light(name):
     assert torch.allclose(Photographs().load(name, pixels.shape[:2]), wanted, atol=1e-6)
 
 
-def test_gray_photographs_have_three_equal_channels():
-    for name in ("camera", "brick", "grass", "gravel", "text"):
-        target = Photographs(count=None).load(name, (40, 60))
-        assert torch.equal(target[0], target[1])
-        assert torch.equal(target[0], target[2])
-
-
 def test_the_digest_is_that_of_the_file_in_the_package():
     file = importlib.resources.files("skimage").joinpath("data", "astronaut.png")
     assert Photographs().digest("astronaut") == hashlib.sha256(file.read_bytes()).hexdigest()

@@ -39,20 +39,20 @@ def test_the_drawings_are_those_of_this_version():
     assert found == pytest.approx(GOLDEN, rel=2e-3)
 
 
+@pytest.fixture(scope="module")
+def photographs() -> list[float]:
+    return [spectral_slope(Crops(renderings=0).load(item, (SIDE, SIDE))) for item in Crops(renderings=0).items()]
+
+
 @pytest.mark.parametrize("kind", SCENES)
-def test_a_scene_has_the_light_and_contrast_that_are_drawn_for_it_and_colour(kind):
+def test_a_scene_has_light_contrast_and_colour_as_drawn_for_it_and_the_spectrum_of_photographs(kind, photographs):
     pictures = torch.stack([rendering(f"{kind}-{number}", (SIDE, SIDE)) for number in range(1, 5)])
     means = pictures.mean((1, 2, 3))
     assert MEAN[0] * 0.98 <= float(means.min()) < float(means.max()) <= MEAN[1] * 1.02
     shares = pictures.mean(1).std((1, 2)) / means
     assert CONTRAST[0] * 0.9 <= float(shares.min()) < float(shares.max()) <= CONTRAST[1] * 1.1
     assert float((pictures.amax(1) - pictures.amin(1)).mean()) > 0.02
-
-
-@pytest.mark.parametrize("kind", SCENES)
-def test_spectra_fall_as_those_of_photographs(kind):
-    photographs = [spectral_slope(Crops(renderings=0).load(item, (SIDE, SIDE))) for item in Crops(renderings=0).items()]
-    slopes = [spectral_slope(rendering(f"{kind}-{number}", (SIDE, SIDE))) for number in range(1, 5)]
+    slopes = [spectral_slope(picture) for picture in pictures]
     assert abs(np.mean(slopes) - np.mean(photographs)) < 2 * np.std(photographs)
 
 

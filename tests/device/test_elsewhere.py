@@ -30,12 +30,12 @@ from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
-from holobench_eval.optics import AngularSpectrum
 from tests.support.replaying import fake_device
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}
 SHORT = {"rounds": 2, "images": 1, "refine_images": 1, "steps": 1, "refine_steps": 1}
+ONCE = SHORT | {"rounds": 1}
 STEPS = {"retrieval": {"iterations": 1}, "start": {"iterations": 1}}
 
 ELSEWHERE = torch.device("meta")
@@ -144,13 +144,6 @@ def test_the_watch_sees_two_devices_forward_and_backward() -> None:
         assert (x * torch.zeros(())).device == ELSEWHERE
 
 
-def test_propagation() -> None:
-    with Elsewhere():
-        field = torch.zeros(96, 128, dtype=torch.complex64, device=ELSEWHERE)
-        model = AngularSpectrum((96, 128), 6.4e-6, 517e-9, 0.01, device=ELSEWHERE)
-        assert model.forward(field).device == model.adjoint(field).device == ELSEWHERE
-
-
 @pytest.mark.parametrize("loss", LOSSES)
 def test_loss_and_gradient_of_wirtinger(ideal: CalibratedBench, loss: Any) -> None:
     with Elsewhere():
@@ -160,7 +153,7 @@ def test_loss_and_gradient_of_wirtinger(ideal: CalibratedBench, loss: Any) -> No
     assert value.device == gradient.device == ELSEWHERE
 
 
-@pytest.mark.parametrize("name", ["ideal", "leto-dusty", "plm-4bit", "pluto-offaxis"])
+@pytest.mark.parametrize("name", ["leto-dusty", "plm-4bit", "pluto-offaxis"])
 def test_a_simulated_bench_and_its_gradient(name: str) -> None:
     place = bench(name)
     with Elsewhere():
@@ -215,10 +208,10 @@ def test_iterations_to_be_recorded_run_where_their_target_is(ideal: CalibratedBe
 
 TRAINED: dict[str, dict[str, Any]] = {
     "hil": STEPS | {"network": SMALL | {"dropout": True}, "training": SHORT, "fallback": True},
-    "hil_tuned": STEPS | {"network": SMALL, "training": SHORT, "offsets": 2},
-    "hil_nh3d": STEPS | {"network": {"name": "unet", "levels": 2, "width": 4}, "training": SHORT | {"rounds": 1}},
-    "hil_terms": STEPS | {"network": SMALL | {"name": "unet"}, "training": SHORT, "search": {"iterations": 1}},
-    "hil_plus": STEPS | {"network": SMALL, "training": SHORT, "search": {"iterations": 1}},
+    "hil_tuned": STEPS | {"network": SMALL, "training": ONCE, "offsets": 2},
+    "hil_nh3d": STEPS | {"network": {"name": "unet", "levels": 2, "width": 4}, "training": ONCE},
+    "hil_terms": STEPS | {"network": SMALL | {"name": "unet"}, "training": ONCE, "search": {"iterations": 1}},
+    "hil_plus": STEPS | {"network": SMALL, "training": ONCE, "search": {"iterations": 1}},
     "parametric_model": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},
     "learned_kernel": STEPS | {"training": SHORT, "search": {"iterations": 1}},
     "cnn_prop_cnn": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},

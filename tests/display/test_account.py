@@ -35,8 +35,10 @@ def test_a_copy_of_the_handle_shares_its_budget(copied: Callable[[MeteredDisplay
             display.capture(phase)
 
 
-def test_threads_share_a_budget() -> None:
+def test_threads_share_a_budget_and_processes_cannot() -> None:
     account = Account("mine", 100)
+    with pytest.raises(TypeError, match="another process"):
+        pickle.dumps(account)
 
     def take(_: int) -> bool:
         try:
@@ -47,11 +49,6 @@ def test_threads_share_a_budget() -> None:
 
     with ThreadPoolExecutor(8) as pool:
         assert sum(pool.map(take, range(400))) == account.captures == 100
-
-
-def test_an_account_is_not_sent_to_another_process() -> None:
-    with pytest.raises(TypeError, match="another process"):
-        pickle.dumps(Account("mine", 1))
 
 
 def test_a_journal_has_the_captures_of_all_accounts_and_a_budget_those_of_one(tmp_path: Path) -> None:

@@ -43,27 +43,17 @@ class Array(Shade):
         return super().predict(phase, bench).detach().numpy()
 
 
-def test_a_prediction_may_be_an_array_of_numpy(display):
-    image = LearnedBench(SPEC, Array(), display.learned, 3).photograph(PHASE, TARGET, "t", 0).image
-    assert torch.equal(image, display.photograph(PHASE, TARGET, "t", 0).image)
-
-
-def test_a_capture_does_not_depend_on_repeat_or_exposure(display):
+def test_a_capture_does_not_depend_on_repeat_or_exposure_and_may_be_an_array_of_numpy(display):
     first = display.photograph(PHASE, TARGET, "t", 0).image
     assert torch.equal(first, display.photograph(PHASE, TARGET, "t", 1, exposure="matched").image)
+    assert torch.equal(first, LearnedBench(SPEC, Array(), display.learned, 3).photograph(PHASE, TARGET, "t", 0).image)
 
 
-def test_a_method_that_captures_is_told_that_there_is_no_camera(display):
+def test_a_method_is_told_that_there_is_no_camera_and_no_bench_to_look_into(display):
     with pytest.raises(CellError, match=r"^a learned display has no camera$"):
         display.for_method(Camera(), "camera", TARGET, "t", 0).capture(PHASE)
-
-
-def test_a_method_without_camera_hears_of_its_own_mistake_first(display):
-    with pytest.raises(CellError, match="blind took a capture, but declares no camera"):
+    with pytest.raises(CellError, match="blind took a capture, but declares no camera"):  # its own mistake comes first
         display.for_method(object(), "blind", TARGET, "t", 0).capture(PHASE)
-
-
-def test_a_privileged_method_is_told_that_there_is_nothing_to_look_into(display):
     with pytest.raises(CellError, match=r"^a learned display has no simulated bench to look into$"):
         _ = display.for_method(Privileged(), "oracle", TARGET, "t", 0).simulation
 

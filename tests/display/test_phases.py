@@ -23,19 +23,11 @@ from holobench_eval.optics.phase import FARTHEST
 
 TAU = math.tau
 PANEL = (128, 128)
-OPEN = (
-    "double_phase",
-    "double_phase_aa",
-    "double_phase_bl",
-    "gerchberg_saxton",
-    "hio",
-    "wirtinger",
-    "sgd",
-    "multi_plane",
-)
-FEW = {"wirtinger": 30, "sgd": 30, "multi_plane": 30}  # iterations
+FEW = {"iterations": 30}
+OPEN = {"double_phase": {}, "double_phase_aa": {}, "double_phase_bl": {}, "gerchberg_saxton": {}, "hio": {}}
+OPEN |= {"wirtinger": FEW, "sgd": FEW, "multi_plane": FEW}
 
-DEGREES, LEVELS = np.degrees(1.0), 255.99 / TAU
+DEGREES, LEVELS, DRAW = np.degrees(1.0), 255.99 / TAU, torch.Generator()
 ODD = {
     "the other sign": (lambda phase: -phase, "fits its target better with the opposite sign (correlation"),
     "left to right": (lambda phase: phase.flip(-1), "better mirrored left to right"),
@@ -54,10 +46,7 @@ ODD = {
     "turns": (lambda phase: phase / TAU, "better read as turns"),
     "turns of both signs": (lambda phase: (phase / TAU + 0.5) % 1 - 0.5, "better read as turns"),
     "levels over their number": (lambda phase: (phase / TAU * 255).round() / 255, "better read as turns"),
-    "noise": (
-        lambda phase: 6 * torch.rand(phase.shape, generator=torch.Generator().manual_seed(1)),
-        "makes nothing like",
-    ),
+    "noise": (lambda phase: 6 * torch.rand(phase.shape, generator=DRAW.manual_seed(1)), "makes nothing like"),
 }
 
 
@@ -66,14 +55,13 @@ def display(request: pytest.FixtureRequest) -> hb.OpenDisplay:
     return hb.open_display(request.param, panel=PANEL)
 
 
-@pytest.fixture(scope="module", params=["astronaut", "coffee"])
-def target(request: pytest.FixtureRequest, display: hb.OpenDisplay) -> Tensor:
-    return torch.from_numpy(display.target(getattr(data, request.param)()))
+@pytest.fixture(scope="module")
+def target(display: hb.OpenDisplay) -> Tensor:
+    return torch.from_numpy(display.target(data.coffee()))
 
 
 def solved(display: hb.OpenDisplay, target: Tensor, method: str) -> Tensor:
-    few = {"iterations": FEW[method]} if method in FEW else {}
-    return torch.from_numpy(display.solve(method, target, **few))
+    return torch.from_numpy(display.solve(method, target, **OPEN[method]))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +87,7 @@ def test_a_unit_is_named_for_values_that_do_not_fill_its_span(display: hb.OpenDi
         assert remark in phase_doubt(change(smooth), target, display.spec)
 
 
-@pytest.mark.parametrize("contrast", [0.01, 0.05, 0.07])
+@pytest.mark.parametrize("contrast", [0.01, 0.07])
 @pytest.mark.parametrize("method", ["double_phase", "gerchberg_saxton"])
 def test_a_right_phase_of_a_nearly_even_target_is_not_remarked_on(
     display: hb.OpenDisplay, method: str, contrast: float
@@ -122,14 +110,13 @@ def test_an_amplitude_in_the_place_of_a_phase_is_remarked_on(
     assert remark in phase_doubt(largest * back / back.max(), target, spec)
 
 
-def test_nothing_is_said_where_there_is_nothing_to_compare(display: hb.OpenDisplay, target: Tensor) -> None:
+def test_nothing_is_said_where_there_is_nothing_to_compare_and_a_colour_without_light_has_no_part(
+    display: hb.OpenDisplay, target: Tensor, phase: Tensor
+) -> None:
     shape = (3, *display.spec.shape)
     draw = torch.rand(shape, generator=torch.Generator().manual_seed(2))
     assert phase_doubt(torch.full(shape, 3.0), target, display.spec) == ""
     assert phase_doubt(6 * draw, torch.full_like(target, 0.5), display.spec) == ""
-
-
-def test_a_colour_without_light_has_no_part(display: hb.OpenDisplay, target: Tensor, phase: Tensor) -> None:
     red = target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
     assert phase_doubt(phase, red, display.spec) == ""
     assert "opposite sign" in phase_doubt(-phase, red, display.spec)
@@ -144,7 +131,6 @@ class Spy(torch.Tensor):
     [
         (torch.full((3, *PANEL), math.nan), "phase holds 49152 values that are NaN or infinite"),
         (torch.full((3, *PANEL), 1e300, dtype=torch.float64), "phase holds 49152 values that are NaN or infinite"),
-        (torch.zeros(3, 10, 10), r"phase is \(3, 10, 10\)"),
         (torch.zeros(2, 3, *PANEL), r"phase is \(2, 3, 128, 128\)"),
         (torch.zeros(3, *PANEL, dtype=torch.complex64), "phase is torch.complex64"),
         (torch.zeros(3, *PANEL).as_subclass(Spy), "phase is Spy, the display shows a plain"),
@@ -155,9 +141,8 @@ def test_what_no_display_can_show_is_refused_by_the_name_of_its_method(phase: Te
         check_phase(phase, load_profile("ideal").spec(PANEL), "mine")
 
 
-def test_a_phase_is_shown_as_long_as_single_precision_has_its_place_in_the_turn(display: hb.OpenDisplay) -> None:
-    inside = torch.full((3, *display.spec.shape), FARTHEST)
-    check_phase(inside, display.spec, "")
+def test_a_phase_is_shown_as_long_as_single_precision_has_its_place_in_the_turn() -> None:
+    check_phase(torch.full((3, *PANEL), FARTHEST), load_profile("ideal").spec(PANEL), "")
     assert float(np.spacing(np.float32(0.99 * FARTHEST))) < TAU / 256 < float(np.spacing(np.float32(FARTHEST)))
 
 

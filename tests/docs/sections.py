@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from holobench_eval.core.json_schema import resolved
 from holobench_eval.core.parameters import allowed
 
 LONGEST = 5  # names that a cell lists; of more, holoeval list has them
+
+
+def introduction(page: Path, mark: str) -> str:
+    """What stands on a page above a line, and the line."""
+    return "".join(page.read_text(encoding="utf-8").partition(mark)[:2])
 
 
 def mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]]:

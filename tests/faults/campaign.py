@@ -9,8 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import random
-import shutil
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,18 +19,12 @@ from typing import Any
 from holobench_eval.core.hashing import digest
 from holobench_eval.study.executors.processes import PRELOADED, start
 from holobench_eval.study.phases import phases_of
-from tests.faults.counts import account, forget, reported, taken
-from tests.faults.life import DEVICES, SAID, SIMULATED, TRACEBACK, begin, ends, live
-from tests.faults.system import FAULTS, FAULTS_OF_DEVICES
+from tests.faults.counts import CAMERA, account, forget, reported, taken
+from tests.faults.life import DEVICES, PHOTOGRAPHING, SAID, SIMULATED, TRACEBACK, begin, ends, live
+from tests.faults.system import FAULTS, FAULTS_AT_CAPTURES, FAULTS_OF_DEVICES
 
-TIMES = {
-    "seconds",
-    "reused",
-    "memory_mib",
-    "cpu_s",
-    "alone",
-    "sha256",
-}  # of a record: what differs from run to run, and its digest
+# of a record: what differs from run to run, and its digest
+TIMES = {"seconds", "reused", "memory_mib", "cpu_s", "alone", "sha256"}
 CAPTURES = "captures"  # those of attempts that a fault has ended count, too; they are compared with the camera's
 
 
@@ -65,7 +59,11 @@ class Kind:
     where: str
 
 
-KINDS = (Kind(SIMULATED, FAULTS, "workers"), Kind(DEVICES, FAULTS_OF_DEVICES, "serial"))
+KINDS = (
+    Kind(SIMULATED, FAULTS, "workers"),
+    Kind(DEVICES, FAULTS_OF_DEVICES, "serial"),
+    Kind(PHOTOGRAPHING, FAULTS_AT_CAPTURES, "workers"),
+)
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def study(folder: Path, draw: random.Random, faults: list[str], wanted: Whole, s
     seen.hung += not ends(last)
     seen.holes += last.exitcode != 0
     compare(folder, wanted, seen)
-    count(folder, len(faults), seen)
+    count(folder, sum(name not in FAULTS_AT_CAPTURES for name in faults), seen)
 
 
 def unfinish(folder: Path, draw: random.Random) -> None:
@@ -111,9 +109,11 @@ def unfinish(folder: Path, draw: random.Random) -> None:
     for path in sorted((folder / "out/records").glob("*.json")):
         if draw.random() < 0.5:
             record = json.loads(path.read_text())
-            forget(folder, account(path))  # made again, it begins a new account
+            phase = phases_of(folder / "out").path(digest(record["capture"]["phase"]))
+            is_solved = record["label"] == CAMERA and phase.exists()  # though it may have failed to be scored
+            forget(folder, record["target"] if is_solved else account(path))  # made again, it begins a new account
             path.unlink()
-            phases_of(folder / "out").path(digest(record["capture"]["phase"])).unlink(missing_ok=True)
+            phase.unlink(missing_ok=True)
 
 
 def records(folder: Path) -> dict[str, Any]:
@@ -145,7 +145,8 @@ def compare(folder: Path, wanted: Whole, seen: Count) -> None:
 
 
 def count(folder: Path, faults: int, seen: Count) -> None:
-    """Compare the captures that are reported with those that the camera has counted; each fault may cost one more."""
+    """Compare the captures that are reported with those that the camera has counted; each of so many faults may have
+    come between the two."""
     for of, captures in reported(folder).items():
         surplus = captures - taken(folder, of)
         seen.counted += 1
@@ -158,9 +159,7 @@ def without_fault(kind: Kind, folder: Path) -> Whole:
     begin(folder, kind.files)
     if "tests.faults.life" not in PRELOADED:
         PRELOADED.append("tests.faults.life")  # else every life would import the report anew
-    start(live, folder, kind.where).join()
-    shutil.rmtree(folder)
-    begin(folder, kind.files)
+    start(os.getpid).join()  # the process that lives are forked from has imported all
     began = time.monotonic()
     process = start(live, folder, kind.where)
     if not ends(process) or process.exitcode != 0:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.process import BaseProcess
-from pathlib import Path
 
 from holobench_eval.imaging.convention import Levels
 from holobench_eval.lab.devices import Counts, DeviceError
@@ -89,14 +86,3 @@ def failing(fault: Fault | None) -> None:
     if fault:
         slm.fault = camera.fault = fault
     connect(slm, camera)
-
-
-def fails(
-    live: Callable[[Path, Fault], BaseProcess], kind: str, least: int, most: int
-) -> Callable[..., Iterator[BaseProcess]]:
-    """A fault of the campaign: a device fails from a random moment on, so many times."""
-
-    def fault(folder: Path, draw: random.Random, _: float) -> Iterator[BaseProcess]:
-        yield live(folder, Fault(kind, draw.randrange(FRAMES), draw.randint(least, most)))
-
-    return fault

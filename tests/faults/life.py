@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import resource
 import signal
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -29,15 +32,18 @@ from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Lines
 from tests.faults import devices
-from tests.faults.counts import note
+from tests.faults.counts import note, taken
 
 LONGEST = 300.0  # seconds that a life may take before it counts as hung
 WORKERS = 2
 REFUSED, TRACEBACK = 2, 3  # how a life ends that ends with a line, or with a traceback
 SAID = "said.txt"  # what lives print
+PLANNED = Path("planned")  # what the camera does at which capture, see `_counted`
+TARGETS = ("astronaut", "coffee")
 STEP, CAPTURES = running.step, {camera: camera.capture for camera in (BenchSession, RealSession)}
 
 METHOD = """
+import os
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -51,25 +57,31 @@ class Mine:
     def solve(self, target, bench):
         phase = torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
         for _ in range(3):
-            phase = phase + bench.rectify(bench.capture(phase[0])).mean()
+            capture = bench.capture(phase[0])
+            if capture.frame.isnan().any():
+                raise ValueError("a frame of nothing")
+            if capture.frame.isinf().any():
+                os.kill(os.getpid(), 9)
+            phase = phase + bench.rectify(capture).mean()
         return phase
 """
 
-STUDY = """title: faults
-display: {profiles: [leto-mild], panel: [128, 160]}
-targets: {dataset: photographs, params: {count: 2}}
-training: {dataset: dead_leaves, params: {count: 4}, held_out: 1}
-protocol: {metrics: [psnr]}
-limits: {seconds: 20}
+STUDY = f"""title: faults
+display: {{profiles: [leto-mild], panel: [128, 160]}}
+targets: {{dataset: photographs, params: {{names: [{", ".join(TARGETS)}]}}}}
+training: {{dataset: dead_leaves, params: {{count: 4}}, held_out: 1}}
+protocol: {{metrics: [psnr]}}
+limits: {{seconds: 20}}
 methods:
   - double_phase
-  - {name: wirtinger, params: {iterations: 5}}
-  - {name: "mine.py:Mine", captures: 3}
-  - {name: parametric_model, params: {training: {rounds: 1, images: 2, steps: 3}}}
+  - {{name: wirtinger, params: {{iterations: 5}}}}
+  - {{name: "mine.py:Mine", captures: 3}}
+  - {{name: parametric_model, params: {{training: {{rounds: 1, images: 2, steps: 3}}}}}}
 """
 
 
 SIMULATED = {"mine.py": METHOD, "study.yaml": STUDY}
+PHOTOGRAPHING = SIMULATED | {"study.yaml": re.sub(r"  - double_phase\n.*wirtinger.*\n", "", STUDY)}
 DEVICES = {"mine.py": METHOD, **devices.FILES}
 
 
@@ -86,9 +98,19 @@ def counting(job: running.Step) -> running.Result:
 
 
 def _counted(capture: Callable[[Any, Tensor], Capture]) -> Callable[[Any, Tensor], Capture]:
+    """A camera that carries out what is planned for a capture once it has counted it: it kills its process, or gives a
+    frame at which the method raises an error or ends its own process."""
+
     def counted(camera: Any, phase: Tensor) -> Capture:
-        note(camera.names)
-        return capture(camera, phase)
+        of, seen = note(camera.names), capture(camera, phase)
+        planned = PLANNED / f"{of} {taken(Path(), of) if of else 0}"
+        if not planned.exists():
+            return seen
+        kind = planned.read_text()
+        planned.unlink()
+        if kind == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        return replace(seen, frame=seen.frame * (math.nan if kind == "raise" else math.inf))
 
     return counted
 

@@ -22,10 +22,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from holobench_eval.study.executors.processes import number_within, start
 from tests.faults import devices
-from tests.faults.counts import TRAINING, account, forget
-from tests.faults.life import LONGEST, REFUSED, SAID, WORKERS, ends, live, on_devices
+from tests.faults.counts import TRAINING, account, forget, taken
+from tests.faults.life import LONGEST, PLANNED, REFUSED, SAID, TARGETS, WORKERS, ends, live, on_devices
 
 Told = Iterator[Any]  # the process of a life, then whether it was hit
 IMPORTS = 1.0  # seconds that a life on a Dask cluster takes to begin
@@ -35,16 +37,8 @@ ANSWER = 60.0  # seconds that a Dask cluster has to begin
 
 def others(driver: BaseProcess) -> list[int]:
     """Workers, processes of methods and their calls."""
-    parents: dict[int, int] = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with suppress(OSError, ValueError):
-                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-    server = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
-    family = [server]
-    for process in family:
-        family += [child for child, parent in parents.items() if parent == process]
-    return [process for process in family[1:] if process != driver.pid]
+    server = psutil.Process(forkserver._forkserver._forkserver_pid)  # type: ignore[attr-defined]
+    return [process.pid for process in server.children(recursive=True) if process.pid != driver.pid]
 
 
 def kills(number: int, of: Callable[[BaseProcess], list[int]]) -> Callable[..., Told]:
@@ -69,6 +63,26 @@ def limits(limit: int, low: int, high: int) -> Callable[..., Told]:
 
     def fault(folder: Path, draw: random.Random, length: float) -> Told:
         yield start(live, folder, "serial", {limit: round(low * (high / low) ** draw.random())})
+
+    return fault
+
+
+def at_capture(kind: str) -> Callable[..., Told]:
+    """A fault: the camera carries it out at one of the next captures of each target, or of the training. So it meets
+    the capture that was drawn for it, however busy the machine is."""
+
+    def fault(folder: Path, draw: random.Random, length: float) -> Told:
+        planned = folder / PLANNED
+        shutil.rmtree(planned, ignore_errors=True)
+        planned.mkdir()
+        of_all = (*TARGETS, TRAINING) if kind == "kill" else TARGETS  # a shipped method takes any frame
+        for of in of_all:
+            (planned / f"{of} {taken(folder, of) + draw.randint(1, 3)}").write_text(kind)
+        process = start(live, folder, draw.choice(["serial", "workers"]))
+        yield process
+        process.join(LONGEST)
+        yield len(list(planned.iterdir())) < len(of_all)
+        shutil.rmtree(planned)
 
     return fault
 
@@ -212,9 +226,19 @@ FAULTS: dict[str, Any] = {
 
 def device(kind: str, least: int, most: int) -> Callable[..., Told]:
     """A fault: from a random moment on, a device fails so many times."""
-    return devices.fails(lambda folder, fault: start(live, folder, "serial", None, False, fault), kind, least, most)
+
+    def fault(folder: Path, draw: random.Random, length: float) -> Told:
+        planned = devices.Fault(kind, draw.randrange(devices.FRAMES), draw.randint(least, most))
+        yield start(live, folder, "serial", None, False, planned)
+
+    return fault
 
 
+FAULTS_AT_CAPTURES: dict[str, Any] = {
+    "the camera's process is killed at a capture": at_capture("kill"),
+    "the method raises at a capture": at_capture("raise"),
+    "the method's process is killed at a capture": at_capture("die"),
+}
 FAULTS_OF_DEVICES: dict[str, Any] = {
     "a frame does not come": device("late", 1, 6),
     "an old frame comes": device("old", 1, 6),

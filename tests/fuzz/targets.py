@@ -181,8 +181,5 @@ TARGETS = {
             b'["dict", ["ask", "capture"], ["args", ["tuple", ["class", "Capture", ["dict", ["dark", 0.5]]]]]]',
         ],
     ),
-    "records.csv": Target(
-        lambda content, folder: records_of(folder, content.decode("utf-8", "replace")),
-        _csv,
-    ),
+    "records.csv": Target(lambda content, folder: records_of(folder, content.decode("utf-8", "replace")), _csv),
 }

@@ -33,10 +33,10 @@ def psnr(frame: np.ndarray, warp: Warp, target: np.ndarray) -> float:
     return float(-10 * np.log10(np.mean((image - target) ** 2)))
 
 
-@pytest.mark.parametrize("contrast", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("contrast", [0.5, 1.0])
 def test_it_finds_the_grid_where_it_is_whatever_the_first_one_says(contrast):
     apart = []
-    for number in (1, 6, 11):
+    for number in (1, 6):
         pose = replace(random_pose(number), contrast=contrast)
         frame, grid = photograph(pose), fiducial(pose.shape).image.numpy()
         for pixels in (0.2, 5.0):
@@ -48,7 +48,7 @@ def test_it_finds_the_grid_where_it_is_whatever_the_first_one_says(contrast):
     assert max(apart) < 0.8
 
 
-@pytest.mark.parametrize(("number", "contrast"), [(1, 0.4), (6, 1.0), (11, 0.4)])
+@pytest.mark.parametrize(("number", "contrast"), [(1, 0.4), (6, 1.0)])
 def test_a_photograph_scores_the_same_through_it_as_through_the_truth(number, contrast):
     pose = replace(random_pose(number), contrast=contrast)
     target = scene(pose.shape)

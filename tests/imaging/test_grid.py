@@ -65,21 +65,6 @@ def test_image_is_linear_light_of_the_region_with_a_dark_border(shape):
     assert float(grid.image[border].max()) == 0.0
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-def test_marks_equal_none_of_their_mirrors_and_turns(shape):
-    grid = fiducial(shape)
-    marks = grid.marks.reshape(grid.rows, grid.columns)
-    turned = [np.rot90(each, quarter) for each in (marks, marks[:, ::-1]) for quarter in range(4)]
-    others = [other for other in turned[1:] if other.shape == marks.shape]
-    assert all((other != marks).sum() >= 4 for other in others)
-
-
-def test_number_of_circles_stays_within_what_the_detector_can_order():
-    counts = [len(fiducial(shape).centres) for shape in SHAPES]
-    assert min(counts) >= 16
-    assert max(counts) <= 400
-
-
 def test_a_region_too_small_for_a_grid_is_refused():
     with pytest.raises(UserError, match="too small"):
         fiducial((160, 95))

@@ -34,10 +34,8 @@ def registered(grid: FiducialGrid, where: Pose, sensor: tuple[int, int], draw: n
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("quarter_turns", range(4))
-@pytest.mark.parametrize(("shape", "sensor"), [((160, 160), (360, 360)), ((128, 208), (440, 440))])
-def test_a_clean_capture_is_registered_to_a_twentieth_of_a_pixel_in_all_eight_orientations(
-    shape, sensor, quarter_turns, mirrored
-):
+def test_a_clean_capture_is_registered_to_a_twentieth_of_a_pixel_in_all_eight_orientations(quarter_turns, mirrored):
+    shape, sensor = (128, 208), (440, 440)
     draw = random("clean", shape, quarter_turns, mirrored)
     where = pose(draw, shape, sensor, quarter_turns=quarter_turns, mirrored=mirrored)
     found = registered(fiducial(shape), where, sensor, draw, contrast=0.0, uneven=False)
@@ -58,7 +56,7 @@ def test_uneven_light_and_stray_light_do_not_pull_the_grid(grid):
 @pytest.mark.parametrize(("contrast", "median", "largest"), [(0.7, 0.12, 0.25), (1.0, 0.18, 0.35)])
 def test_speckle_leaves_a_fraction_of_a_pixel(grid, contrast, median, largest):
     errors, residuals = [], []
-    for index in range(12):
+    for index in range(5):
         draw = random("speckle", contrast, index)
         where = pose(draw, SHAPE, SENSOR)
         found = registered(grid, where, SENSOR, draw, contrast=contrast, background=0.1 * (index % 2))
@@ -67,13 +65,6 @@ def test_speckle_leaves_a_fraction_of_a_pixel(grid, contrast, median, largest):
     assert np.median(errors) < median
     assert max(errors) < largest
     assert max(residuals) < 0.3
-
-
-@pytest.mark.parametrize("scale", [1.1, 2.6])
-def test_the_size_of_the_grid_on_the_sensor_need_not_be_known(grid, scale):
-    draw = random("scale", scale)
-    where = pose(draw, SHAPE, (480, 560), scale=scale)
-    assert corner_error(registered(grid, where, (480, 560), draw, contrast=0.7), where) < 0.3
 
 
 def test_a_distortion_is_fitted_where_there_is_one_and_left_out_where_there_is_none(grid):
@@ -97,11 +88,10 @@ def test_a_distortion_is_fitted_in_speckle_too(grid):
     assert corner_error(found, where) < 0.5
 
 
-@pytest.mark.parametrize("index", [26, 31])
-def test_uneven_light_is_not_taken_for_a_distortion(index):
-    """Two of forty draws in which the F-test alone, at one in a thousand, sees a distortion in speckle and fringes."""
+def test_uneven_light_is_not_taken_for_a_distortion():
+    """One of forty draws in which the F-test alone, at one in a thousand, sees a distortion in speckle and fringes."""
     shape, sensor = (400, 400), (960, 960)
-    draw = random("no distortion", index)
+    draw = random("no distortion", 31)
     where = pose(draw, shape, sensor)
     found = registered(fiducial(shape), where, sensor, draw, contrast=0.7, background=0.1)
     assert not found.warps[0].quadratic.any()
@@ -137,28 +127,6 @@ def test_a_registration_survives_its_plain_description(grid):
     assert again.residual == found.residual
 
 
-def photograph() -> np.ndarray:
-    return data.camera()[:360, :360] / 255
-
-
-def grid_half_outside() -> np.ndarray:
-    draw = random("half")
-    frame = capture(fiducial(SHAPE).image.numpy(), pose(draw, SHAPE, SENSOR), SENSOR, draw, contrast=0.0)
-    return np.roll(frame, 180, axis=1)
-
-
-def dark() -> np.ndarray:
-    return np.zeros(SENSOR)
-
-
-# Others are refused in tests/testing: speckle, checkerboards, grids without their marks.
-@pytest.mark.parametrize("make", [photograph, grid_half_outside, dark])
-def test_anything_but_the_whole_marked_grid_is_refused_in_one_line(grid, make):
-    with pytest.raises(CellError, match="registration of channel 0: no grid") as raised:
-        register(torch.from_numpy(make().astype(np.float32))[None], grid)
-    assert "\n" not in str(raised.value)
-
-
 def test_one_channel_without_a_grid_refuses_all(grid):
     draw = random("one channel")
     frame = capture(grid.image.numpy(), pose(draw, SHAPE, SENSOR), SENSOR, draw, contrast=0.0)
@@ -176,15 +144,10 @@ def test_a_residual_above_the_bound_is_refused_with_its_size(grid):
         register(torch.from_numpy(frame)[None], grid, bound=0.05)
 
 
-def test_a_region_that_reaches_beyond_the_sensor_is_refused(grid):
-    draw = random("beyond")
-    frame = capture(grid.image.numpy(), pose(draw, SHAPE, SENSOR, quarter_turns=0), SENSOR, draw, contrast=0.0)
-    lit = np.flatnonzero(frame.max(axis=0) > 0.3 * frame.max())
-    with pytest.raises(CellError, match=r"partly outside the sensor|no grid"):
-        register(torch.from_numpy(np.ascontiguousarray(frame[:, lit[0] - 4 :]))[None], grid)
-
-
+# Others are refused in tests/testing: photographs, speckle, checkerboards, grids without their marks or half outside.
 def test_captures_that_cannot_be_are_refused(grid):
+    with pytest.raises(CellError, match=r"registration of channel 0: no grid[^\n]*$"):
+        register(torch.zeros(1, *SENSOR), grid)
     with pytest.raises(CellError, match="finite"):
         register(torch.full((1, *SENSOR), float("nan")), grid)
     with pytest.raises(CellError, match="shape"):

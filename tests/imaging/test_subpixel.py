@@ -65,12 +65,6 @@ def test_a_beam_and_scattered_light_are_taken_out():
     assert np.abs(offsets(compress(uneven), GRID)).max() > 0.1
 
 
-def test_the_blur_is_of_the_same_width_in_the_region_for_a_finer_sensor():
-    finer = Warp(GRID.shape, np.array([[3, 0, 1.0], [0, 3, 1.0], [0, 0, 1]]), np.zeros((6, 2)))
-    frame = np.repeat(np.repeat(IMAGE, 3, axis=0), 3, axis=1)
-    assert correlation(even_picture(frame, finer, GRID), GRID) > 0.998
-
-
 def test_correlation_is_one_with_the_template_and_not_changed_by_light_far_from_the_circles():
     assert correlation(template(GRID), GRID) == pytest.approx(1.0)
     bright = template(GRID).copy()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from holobench_eval.imaging.warp import Warp, quadratic_surface, quadratic_terms, remap
+from holobench_eval.imaging.warp import Warp, remap
 
 SHAPE = (5, 9)
 HOMOGRAPHY = np.array([[1.5, 0.2, 3.0], [-0.1, 1.4, 7.0], [1e-3, -2e-3, 1.0]])
@@ -15,23 +15,6 @@ QUADRATIC = np.random.default_rng(0).normal(0, 0.3, (6, 2))
 def points():
     x, y = np.meshgrid(np.arange(9.0), np.arange(5.0))
     return np.stack([x.ravel(), y.ravel()], axis=1)
-
-
-def test_the_terms_of_the_quadratic_run_from_minus_one_to_one_over_the_region():
-    terms = quadratic_terms(np.array([[0, 0], [8, 4], [4, 2], [8, 0], [6, 2]]), SHAPE)
-    assert terms.tolist() == [
-        [1, -1, -1, 1, 1, 1],
-        [1, 1, 1, 1, 1, 1],
-        [1, 0, 0, 0, 0, 0],
-        [1, 1, -1, 1, -1, 1],
-        [1, 0.5, 0, 0.25, 0, 0],
-    ]
-
-
-def test_a_surface_has_the_values_of_the_terms_at_the_pixels():
-    surface = quadratic_surface(QUADRATIC[:, 0], SHAPE)
-    assert surface.shape == SHAPE
-    assert np.allclose(surface.ravel(), quadratic_terms(points(), SHAPE) @ QUADRATIC[:, 0])
 
 
 def test_points_are_bent_and_then_seen_in_perspective():

@@ -24,9 +24,3 @@ def test_the_documented_bench_file_is_read_and_its_settings_are_those_that_exist
     assert bench.capture == CaptureSettings()  # the page shows the defaults
     assert isinstance(laser(bench.laser, 3, tmp_path, pytest.fail), SwitchedLaser)
     assert "{channel}" in bench.laser.command
-
-
-def test_the_drawing_is_there_and_light():
-    drawing = PAGE.parent / "figures" / "real-bench.svg"
-    assert f"figures/{drawing.name}" in PAGE.read_text(encoding="utf-8")
-    assert drawing.stat().st_size < 20_000

@@ -34,12 +34,12 @@ def table(monkeypatch, tmp_path):
     forget_sessions()
 
 
-def run(folder: Path, *more: str):
-    return CliRunner().invoke(app, ["run", str(folder / "study.yaml"), "--output", str(folder / "out"), *more])
+def run(folder: Path):
+    return CliRunner().invoke(app, ["run", str(folder / "study.yaml"), "--output", str(folder / "out")])
 
 
-def test_a_study_runs_on_devices_after_the_bench_was_checked(table):
-    folder, _, _ = table
+def test_a_study_runs_on_a_bench_that_was_checked_and_a_camera_that_goes_away_ends_it(table, monkeypatch):
+    folder, _, camera = table
     done = run(folder)
     assert done.exit_code == 0, (done.output, done.exception)
     for line in ("exposure:", "dark:", "linearity:", "phase convention:", "phase.two_pi_level:"):
@@ -47,6 +47,19 @@ def test_a_study_runs_on_devices_after_the_bench_was_checked(table):
     scores = pd.read_csv(folder / "out" / "table.csv").set_index(["label", "condition"])["psnr_linear_db"]
     assert scores["wirtinger", "small-table"] > scores["double_phase", "small-table"] + 2
     assert "real bench" in (folder / "out" / "report.md").read_text()
+
+    def gone(seconds):
+        raise DeviceError("unplugged")
+
+    monkeypatch.setattr(camera, "expose", gone)
+    records = {path: path.read_text() for path in (folder / "out" / "records").glob("*.json")}
+    unmade = [path for path, text in records.items() if '"wirtinger"' in text or '"double_phase"' in text]
+    for path in unmade:
+        path.unlink()
+    done = run(folder)
+    assert isinstance(done.exception, UserError)
+    assert "unplugged" in str(done.exception)
+    assert all(path.read_text() == text for path, text in records.items() if path not in unmade)
 
 
 def test_a_wrong_sign_is_refused_before_anything_is_computed(table):
@@ -56,19 +69,3 @@ def test_a_wrong_sign_is_refused_before_anything_is_computed(table):
     assert isinstance(done.exception, UserError)
     assert "phase.sign" in str(done.exception)
     assert not (folder / "out").exists()
-
-
-def test_a_camera_that_goes_away_ends_the_run_and_keeps_what_is_done(table, monkeypatch):
-    folder, _, camera = table
-    assert run(folder).exit_code == 0
-    for record in (folder / "out" / "records").glob("*.json"):
-        if '"wirtinger"' in record.read_text() or '"double_phase"' in record.read_text():
-            record.unlink()
-
-    def gone(seconds):
-        raise DeviceError("unplugged")
-
-    monkeypatch.setattr(camera, "expose", gone)
-    done = run(folder)
-    assert isinstance(done.exception, UserError)
-    assert "unplugged" in str(done.exception)

@@ -38,16 +38,9 @@ def check_linearity(exposure=0.02, picture=None, **camera):
     return linearity(partial(averaged, device, count=2, plane=0), exposure, given_dark(64.0)[0])
 
 
-def test_a_linear_camera_passes():
-    check = check_linearity()
-    assert check.passed
-    assert check.line.startswith("linearity: r^2 1.0000")
-
-
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        ({"gamma": 1 / 2.2}, "is there gamma"),
         ({"gamma": 0.9}, "is there gamma"),
         ({"gamma": 1.1}, "is there gamma"),
         ({"deaf": True}, "automatic gain"),
@@ -58,16 +51,11 @@ def test_a_linear_camera_passes():
     ],
 )
 def test_a_camera_that_is_not_linear_is_refused_in_one_line(settings, line):
+    assert check_linearity().line.startswith("linearity: r^2 1.0000")
     check = check_linearity(**settings)
     assert not check.passed
     assert line in check.line
     assert "\n" not in check.line
-
-
-def test_the_right_convention_gives_an_upright_letter():
-    check = phase_sign(photographer(), green(), Convention())
-    assert check.passed
-    assert check.line.startswith("phase convention: upright")
 
 
 def test_a_reversed_sign_is_seen_and_named():
@@ -90,7 +78,9 @@ def test_a_mirrored_panel_and_a_mirrored_camera_look_the_same_and_are_only_told(
         assert "mirrored left-right" in check.line
         assert "set phase.flip_horizontal: true" in check.line
     flipped = phase_sign(photographer(flipped=True), green(), Convention(flip_horizontal=True))
-    assert flipped.line.startswith("phase convention: upright")
+    for check in (flipped, phase_sign(photographer(), green(), Convention())):
+        assert check.passed
+        assert check.line.startswith("phase convention: upright")
 
 
 @pytest.mark.parametrize(
@@ -98,7 +88,6 @@ def test_a_mirrored_panel_and_a_mirrored_camera_look_the_same_and_are_only_told(
     [
         (1, False, "turned by 90 degrees anticlockwise"),
         (2, False, "turned by 180 degrees"),
-        (3, False, "turned by 270 degrees"),
         (2, True, "mirrored upside down"),
         (1, True, "mirrored left-right and turned by 90"),
     ],
@@ -147,12 +136,6 @@ def test_a_reversed_sign_in_any_channel_is_refused(reversed_channel):
     assert phase_sign(show, green().expand(2, -1, -1), Convention()).passed is (reversed_channel is None)
 
 
-def test_the_right_level_of_a_full_turn_passes():
-    check = full_turn(photographer(two_pi_level=200.0), green(), Convention(two_pi_level=200.0))
-    assert check.passed
-    assert "200 gives" in check.line
-
-
 def test_a_level_that_costs_much_light_is_refused_and_the_best_is_named():
     check = full_turn(photographer(two_pi_level=175.0), green(), Convention())
     assert not check.passed
@@ -178,14 +161,14 @@ def test_every_laser_has_a_best_level_of_its_own():
     assert full_turn(show, both, Convention(two_pi_level=(first, second))).line.endswith("of the best level")
 
 
-def test_a_level_that_costs_little_light_is_only_remarked_on():
-    check = full_turn(photographer(two_pi_level=205.0), green(), Convention())
+@pytest.mark.parametrize(("truth", "set_", "words"), [(200.0, 200.0, "200 gives"), (205.0, 256.0, "consider that")])
+def test_the_right_level_passes_and_one_that_costs_little_light_is_only_remarked_on(truth, set_, words):
+    check = full_turn(photographer(two_pi_level=truth), green(), Convention(two_pi_level=set_))
     assert check.passed
-    assert "consider that" in check.line
+    assert words in check.line
 
 
-@pytest.mark.parametrize("size", [0.35, 0.6, 0.95])
-@pytest.mark.parametrize("turn", [0, 7, 95, -140])
+@pytest.mark.parametrize(("size", "turn"), [(0.35, 0), (0.35, 95), (0.6, 7), (0.6, -140), (0.95, 7), (0.95, 95)])
 def test_the_letter_is_found_at_any_size_place_and_angle_under_speckle(size, turn):
     picture = draw_pattern((200, 240)).numpy()
     pose = cv2.getRotationMatrix2D((119.5, 99.5), turn, size)

@@ -47,26 +47,24 @@ def asked(phase=None, relative=1.0):
     return Request(pattern_phase()[GREEN : GREEN + 1] if phase is None else phase, relative, "hologram", ())
 
 
-def everything():
-    return asked(pattern_phase())
-
-
 def quiet(line):
     pass
 
 
-def truth(bench_rig, phase, channel=GREEN):
+def truth(bench_rig, phase):
     return bench_rig.scene.settled(Convention().levels(phase))
 
 
-def test_preparing_says_one_line_for_each_step_in_order():
-    lines = []
-    ready = rig(channels=(0, 1, 2)).prepare(everything(), lines.append)
+def test_preparing_says_one_line_for_each_step_in_order_and_closing_turns_the_lasers_off():
+    bench_rig, lines = rig(channels=(0, 1, 2)), []
+    ready = bench_rig.prepare(asked(pattern_phase()), lines.append)
     steps = ["exposure", "settling", "dark", "channel 0", "channel 1", "channel 2", "phase convention"]
     assert [line.split(":")[0] for line in lines] == [*steps, "phase.two_pi_level"]
     assert all("\n" not in line for line in lines)
     assert len(ready.exposures) == len(ready.darks) == 3
     assert all(check.passed for check in ready.checks)
+    bench_rig.close()
+    assert bench_rig.scene.selected[-1] is None
 
 
 def test_photographs_are_light_per_second_of_the_channels_own_laser():
@@ -78,7 +76,7 @@ def test_photographs_are_light_per_second_of_the_channels_own_laser():
         dark_rate=40.0,
         hot=15.0,
     )
-    bench_rig.prepare(everything(), quiet)
+    bench_rig.prepare(asked(pattern_phase()), quiet)
     assert bench_rig.prepared.settle > 0.06
     phase = pattern_phase().roll(17, -1)
     for relative in (1.0, 0.4):
@@ -103,12 +101,6 @@ def test_a_bracket_measures_a_picture_that_saturates_one_exposure():
     assert np.abs(taken.light[0].numpy() - expected).max() < 0.02 * expected.max()
 
 
-def test_an_exposure_that_saturates_the_letter_ends_the_preparation():
-    bench_rig = rig(CaptureSettings(exposure=0.2, average=1, dark_frames=2, settle=0.0))
-    with pytest.raises(UserError, match=r"saturated; shorten capture\.exposure"):
-        bench_rig.prepare(asked(), quiet)
-
-
 def test_a_wrong_sign_or_a_bent_camera_ends_the_preparation_in_one_line():
     for settings, line in (({"truth": {"sign": -1}}, "set phase.sign: -1"), ({"gamma": 0.5}, "is there gamma")):
         bench_rig = rig(**settings)
@@ -129,11 +121,14 @@ def test_what_is_set_is_not_measured():
     assert lines[1:3] == ["settling: 250 ms (as set)", "dark: 64.0 counts (as set)"]
 
 
-def test_a_dark_frame_of_another_depth_than_the_camera_ends_the_preparation(tmp_path):
+def test_what_does_not_fit_the_camera_ends_the_preparation(tmp_path):
     np.save(tmp_path / "dark.npy", np.full((4, 4), 20, np.uint8))
-    bench_rig = rig(CaptureSettings(exposure=0.01, dark_frames=0, dark=str(tmp_path / "dark.npy"), settle=0.25))
-    with pytest.raises(UserError, match="8 bits and the photograph 16"):
-        bench_rig.prepare(asked(), quiet)
+    for settings, line in (
+        ({"exposure": 0.2, "average": 1, "dark_frames": 2}, r"saturated; shorten capture\.exposure"),
+        ({"exposure": 0.01, "dark_frames": 0, "dark": str(tmp_path / "dark.npy")}, "8 bits and the photograph 16"),
+    ):
+        with pytest.raises(UserError, match=line):
+            rig(CaptureSettings(**settings, settle=0.0)).prepare(asked(), quiet)
 
 
 def test_exposures_are_relative_to_those_of_the_letter_divided_by_its_own():
@@ -143,28 +138,23 @@ def test_exposures_are_relative_to_those_of_the_letter_divided_by_its_own():
     assert double.photograph(asked(relative=2.0)).exposure[0] == pytest.approx(one.exposures[0], rel=0.05)
 
 
-@pytest.mark.parametrize("shape", [(1, 64, 64), (3, 128, 128), (128, 128)])
-def test_a_phase_of_another_shape_is_refused_in_one_line(shape):
+def test_a_phase_that_cannot_be_shown_is_refused_in_one_line():
     bench_rig = rig()
     bench_rig.prepare(asked(), quiet)
-    with pytest.raises(CellError, match=r"simulated panel with its wavelengths shows \(1, 128, 128\)"):
-        bench_rig.photograph(asked(torch.zeros(shape)))
+    for shape in ((1, 64, 64), (3, 128, 128), (128, 128)):
+        with pytest.raises(CellError, match=r"simulated panel with its wavelengths shows \(1, 128, 128\)"):
+            bench_rig.photograph(asked(torch.zeros(shape)))
     with pytest.raises(CellError, match="no finite real numbers"):
         bench_rig.photograph(asked(torch.full((1, 128, 128), torch.nan)))
 
 
-def test_a_dropped_frame_is_taken_again():
+def test_a_dropped_frame_is_taken_again_a_device_that_fails_costs_a_cell_and_one_that_is_gone_ends_the_run():
     bench_rig = rig()
     bench_rig.prepare(asked(), quiet)
     bench_rig.camera.failures = 1
     before = bench_rig.slm.shown
     assert bench_rig.photograph(asked()).light.isfinite().all()
     assert bench_rig.slm.shown == before + 2  # the hologram too, since nobody knows what the panel shows
-
-
-def test_a_device_that_fails_costs_a_cell_and_one_that_is_gone_ends_the_run():
-    bench_rig = rig()
-    bench_rig.prepare(asked(), quiet)
     bench_rig.slm.failures = 2
     with pytest.raises(CellError, match="no photograph: simulated panel: not connected"):
         bench_rig.photograph(asked())
@@ -194,13 +184,8 @@ def test_without_a_switch_the_user_is_asked_to_block_the_beam_once_each_way():
     bench_rig.laser = SteadyLaser(ask)
     bench_rig.scene.select(GREEN)
     bench_rig.prepare(asked(), quiet)
-    assert heard == ["block the laser beam", "open the laser beam again"]
-
-
-def test_closing_turns_the_lasers_off():
-    bench_rig = rig()
     bench_rig.close()
-    assert bench_rig.scene.selected == [None]
+    assert heard == ["block the laser beam", "open the laser beam again"]
 
 
 def test_a_colour_cameras_plane_follows_the_wavelength():

@@ -9,7 +9,8 @@ from holobench_eval.methods.descent import Adam, adam, by_autograd
 
 def gradients(steps: int, *shape: int) -> list[torch.Tensor]:
     draw = torch.Generator().manual_seed(1)
-    return [torch.randn(shape, generator=draw) * (0.1 + step % 3) for step in range(steps)]
+    some = torch.rand(shape, generator=draw) > 0.1  # a pixel without a gradient stays
+    return [some * torch.randn(shape, generator=draw) * (0.1 + step % 3) for step in range(steps)]
 
 
 @pytest.mark.parametrize("with_numba", [True, False])
@@ -25,14 +26,6 @@ def test_steps_are_those_of_torch(with_numba, monkeypatch):
         theirs.step()
     assert torch.allclose(phase, expected, atol=1e-6)
     assert phase.abs().max() > 0.1
-
-
-def test_pixels_without_a_gradient_stay():
-    phase = torch.ones(1, 8, 8)
-    optimiser = Adam(phase, 0.1)
-    for _ in range(3):
-        optimiser.step(torch.zeros(1, 8, 8))
-    assert torch.equal(phase, torch.ones(1, 8, 8))
 
 
 def test_the_size_of_the_panel_changes_no_pixel_of_the_descent():

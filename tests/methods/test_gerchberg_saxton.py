@@ -44,12 +44,6 @@ def test_a_hologram_that_is_already_exact_stays(bench, scene):
     assert torch.allclose(torch.remainder(after - phase + 1, 2 * torch.pi), torch.ones_like(phase))
 
 
-def test_more_iterations_give_a_better_image(bench, scene, linear_psnr):
-    target = scene()
-    short, long = (linear_psnr(GerchbergSaxton(iterations=n).solve(target, bench), target, bench) for n in (5, 60))
-    assert long > short + 3
-
-
 def test_hio_converges_further_than_gerchberg_saxton(bench, scene, linear_psnr):
     target = scene()
     plain = linear_psnr(GerchbergSaxton(iterations=60).solve(target, bench), target, bench)

@@ -13,9 +13,12 @@ from torch import Tensor
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.metered import MeteredDisplay
-from holobench_eval.methods.learned import retrieval
+from holobench_eval.methods.calibrated import patterns
+from holobench_eval.methods.learned import fallback, retrieval
 from holobench_eval.methods.learned.retrieval import Image
+from holobench_eval.methods.predictors import veil
 from holobench_eval.methods.predictors.nested import NestedPrediction
+from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.small_training import (
     Fate,
     Killed,
@@ -40,6 +43,20 @@ all_methods = pytest.mark.parametrize("name", NAMES)
 predicting = pytest.mark.parametrize("name", PREDICTING)
 
 
+@pytest.fixture(autouse=True)
+def _short_holograms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trainings that are compared bit by bit need no converged holograms of dark patterns and of the fallback."""
+    for module in (patterns, veil):
+        monkeypatch.setattr(module, "Wirtinger", lambda: Wirtinger(iterations=5))
+    monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=5))
+
+
+def short(name: str) -> Any:
+    """A shipped method with short settings, in its start too."""
+    method = quick(name)
+    return replace(method, start=replace(method.start, iterations=5)) if name == "hil_tuned" else method
+
+
 def trained(method: Any, seed: int = 3) -> Mapping[str, Any]:
     """What a short training gives, as it comes back from its file."""
     return through_a_file(dict(method.prepare(training_bench(SPEC, Memory(), images=2, seed=seed))))
@@ -47,7 +64,7 @@ def trained(method: Any, seed: int = 3) -> Mapping[str, Any]:
 
 @cache
 def learned(name: str) -> Mapping[str, Any]:
-    return trained(quick(name))
+    return trained(short(name))
 
 
 def test_every_method_that_learns_a_display_has_the_switch_of_the_fallback_and_leaves_it_off() -> None:
@@ -56,7 +73,7 @@ def test_every_method_that_learns_a_display_has_the_switch_of_the_fallback_and_l
 
 def opened(name: str, target: Tensor) -> tuple[Any, MeteredDisplay]:
     """A method with short settings and its handle for targets ``(B, C, h, w)``."""
-    method = quick(name)
+    method = short(name)
     if (reason := getattr(method, "available", lambda: None)()) is not None:
         pytest.skip(reason)
     if name in TRAINED:
@@ -72,48 +89,39 @@ def solved(name: str, target: Tensor) -> Tensor:
 
 
 @all_methods
-def test_a_phase_has_the_shape_of_the_panel_and_is_finite(name: str) -> None:
-    phase = solved(name, pictures(SPEC, 2))
-    assert phase.shape == (2, 3, *SPEC.shape)
-    assert phase.dtype == torch.float32
-    assert phase.isfinite().all()
-    assert not phase.requires_grad
-
-
-@all_methods
-def test_the_target_is_left_as_it_was(name: str) -> None:
-    target = pictures(SPEC)
+def test_a_phase_is_finite_and_of_the_panel_the_same_again_and_takes_nothing_but_the_captures_of_a_camera(
+    name: str,
+) -> None:
+    target, phases = pictures(SPEC, 2), []
     before = target.clone()
-    solved(name, target)
-    assert torch.equal(target, before)
-
-
-@all_methods
-def test_the_same_cell_gives_the_same_phase_whatever_torchs_random_numbers(name: str) -> None:
-    phases = []
     for seed in (1, 2):
         torch.manual_seed(seed)
-        phases.append(solved(name, pictures(SPEC)))
+        method, handle = opened(name, target)
+        phases.append(method.solve(target, handle))
+        assert 0 < handle.captures <= 2 * method.captures if name in WITH_CAMERA else handle.captures == 0
+    assert torch.equal(target, before)
     assert torch.equal(*phases)
+    assert phases[0].shape == (2, 3, *SPEC.shape)
+    assert phases[0].dtype == torch.float32
+    assert phases[0].isfinite().all()
+    assert not phases[0].requires_grad
 
 
 # The captures of a batch are taken one after the other, under noise of their own.
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in WITH_CAMERA])
 def test_an_image_does_not_depend_on_its_batch(name: str) -> None:
     target = pictures(SPEC, 2)
-    together = solved(name, target)
-    handle = opened(name, target)[1]  # made for the first image, as the batch's is
-    apart = torch.cat([quick(name).solve(image[None], handle) for image in target])
-    difference = torch.remainder(together - apart + torch.pi, 2 * torch.pi) - torch.pi
-    assert difference.abs().max() < 1e-3
+    method, handle = opened(name, target)  # made for the first image, as the batch's is
+    alike(method, target, handle)
 
 
-def test_an_image_does_not_depend_on_its_batch_in_a_line_search(bench, scene) -> None:
-    method = plugins.build("methods", "wirtinger", {"iterations": 6, "optimiser": "lbfgs"})
-    target = scene(batch=2)
-    together = method.solve(target, bench)
-    apart = torch.cat([method.solve(target[i : i + 1], bench) for i in range(2)])
-    difference = torch.remainder(together - apart + torch.pi, 2 * torch.pi) - torch.pi
+def test_nor_does_it_in_a_line_search(bench, scene) -> None:
+    alike(plugins.build("methods", "wirtinger", {"iterations": 6, "optimiser": "lbfgs"}), scene(batch=2), bench)
+
+
+def alike(method: Any, target: Tensor, handle: Any) -> None:
+    apart = torch.cat([method.solve(image[None], handle) for image in target])
+    difference = torch.remainder(method.solve(target, handle) - apart + torch.pi, 2 * torch.pi) - torch.pi
     assert difference.abs().max() < 1e-3
 
 
@@ -122,13 +130,6 @@ def test_a_black_channel_gives_a_finite_phase(name: str) -> None:
     target = pictures(SPEC)
     target[:, 1] = 0
     assert solved(name, target).isfinite().all()
-
-
-@all_methods
-def test_captures_are_taken_by_methods_with_a_camera_alone_and_within_their_number(name: str) -> None:
-    method, handle = opened(name, pictures(SPEC))
-    method.solve(pictures(SPEC), handle)
-    assert 0 < handle.captures <= method.captures if name in WITH_CAMERA else handle.captures == 0
 
 
 def test_every_method_has_a_name_for_people_that_no_other_has() -> None:
@@ -175,22 +176,22 @@ def test_what_a_training_gives_can_be_kept_and_predicts_what_retrieval_saw(
 @predicting
 def test_training_is_decided_by_the_seeds_alone(name: str) -> None:
     torch.manual_seed(8)
-    once = trained(quick(name))
+    once = trained(short(name))
     assert same(once, learned(name))
-    assert not same(trained(quick(name), seed=4), once)
+    assert not same(trained(short(name), seed=4), once)
     drawn = name not in ("parametric_model", "learned_kernel", "image_terms")
-    assert same(trained(replace(quick(name), seed=1)), once) != drawn
+    assert same(trained(replace(short(name), seed=1)), once) != drawn
 
 
 # The error budget's three are trained as the parametric model is.
 @pytest.mark.parametrize("name", [name for name in PREDICTING if not issubclass(CLASSES[name], NestedPrediction)])
 def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
-    method, memory = replace(quick(name), fallback=True), Memory(as_files=True)
+    method, memory = replace(short(name), fallback=True), Memory(as_files=True)
     bench = training_bench(SPEC, memory, images=2)
     whole, moments = method.prepare(bench), memory.fate.passed
-    kinds = ("after a photograph", "after keeping approximator", "before a row")
-    photographs, kept, rows = ([at for at, moment in enumerate(moments) if moment == kind] for kind in kinds)
-    for at in (photographs[1], photographs[-1], kept[0], rows[-1]):
+    kinds = ("after a photograph", "after keeping approximator")
+    photographs, kept = ([at for at, moment in enumerate(moments) if moment == kind] for kind in kinds)
+    for at in (photographs[1], photographs[-1], kept[0]):
         memory = Memory(as_files=True)
         torch.manual_seed(at)
         with pytest.raises(Killed):
@@ -201,19 +202,12 @@ def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
         assert again.captures == bench.captures, (at, moments[at])
 
 
-@pytest.mark.parametrize("name", ["gerchberg_saxton", "hio"])
-def test_another_cell_starts_from_another_random_phase(name, bench, scene):
-    target = scene()
-    here = plugins.build("methods", name, {"iterations": 6}).solve(target, bench)
-    bench.cell = "another cell"
-    assert not torch.allclose(here, plugins.build("methods", name, {"iterations": 6}).solve(target, bench), atol=0.1)
-
-
 @pytest.mark.parametrize(
     ("name", "pupil", "params"),
     [
-        *((name, None, {"iterations": 100}) for name in ("gerchberg_saxton", "hio", "wirtinger", "sgd")),
-        *((name, 0.8, {}) for name in ("wirtinger", "sgd")),
+        ("gerchberg_saxton", None, {"iterations": 100}),
+        ("wirtinger", None, {"iterations": 100}),
+        ("wirtinger", 0.8, {}),
     ],
 )
 def test_iterating_beats_double_phase_and_gradient_methods_do_behind_its_iris(
@@ -245,15 +239,10 @@ def test_iterating_beats_double_phase_and_gradient_methods_do_behind_its_iris(
         ("hil", {"training": {"rounds": 0}}, "'training.rounds'"),
         ("hil", {"retrieval": {"l2": -1}}, "'retrieval.l2'"),
         ("hil_tuned", {"offsets": 0}, "'offsets'"),
-        ("hil_plus", {"with_network": True}, "'with_network'"),
         ("hil_plus", {"retrieval": {"adversarial": 0.5}}, "adversarial"),
         ("hil_nh3d", {"training": {"step": 3}}, "did you mean 'steps'"),
         ("parametric_model", {"patterns": -1}, "'patterns'"),
-        ("parametric_model", {"search": {"adversarial": 0.5}}, "adversarial"),
-        ("hybrid_model", {"width": 1}, "'width'"),
         ("cnn_prop_cnn", {"width": 0}, "'width'"),
-        ("learned_kernel", {"kernel": 3}, "'kernel'"),
-        ("learned_kernel", {"training": {"step": 3}}, "did you mean 'steps'"),
     ],
 )
 def test_a_wrong_parameter_is_one_line_that_names_it(name, params, words):

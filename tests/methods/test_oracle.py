@@ -32,16 +32,6 @@ def test_the_oracle_never_falls_behind_its_start(bench, scene):
     assert bench_loss(phase, target[0], bench) <= start * (1 + 1e-5)
 
 
-def test_without_a_simulated_bench_the_refusal_reaches_the_caller(bench, scene):
-    class Hardware(type(bench)):
-        @property
-        def simulation(self):
-            raise LookupError("no simulated bench here")
-
-    with pytest.raises(LookupError, match="no simulated bench"):
-        Oracle(iterations=1).solve(scene(), Hardware(bench.spec))
-
-
 def test_a_better_phase_of_another_method_is_picked_up_in_the_colour_where_it_is_better(bench, scene):
     target = scene(channels=3)
     short = Oracle(iterations=1, step=1e-6, rounds=1)  # a descent that finds nothing
@@ -51,14 +41,6 @@ def test_a_better_phase_of_another_method_is_picked_up_in_the_colour_where_it_is
     phase = short.solve(target, replace(bench, starts=(torch.zeros_like(good), planted)))[0]
     assert torch.allclose(phase[1], good[1], atol=1e-4)
     assert torch.allclose(phase[[0, 2]], own[[0, 2]], atol=1e-4)
-
-
-def test_no_start_is_better_than_what_the_oracle_returns(bench, scene):
-    target = scene(channels=3)
-    starts = tuple(Wirtinger(iterations=n).solve(target, bench)[0] for n in (5, 40, 200))
-    phase = Oracle(iterations=5, rounds=1).solve(target, replace(bench, starts=starts))[0]
-    errors = [expected_error(start, bench.simulation, target[0]) for start in starts]
-    assert (expected_error(phase, bench.simulation, target[0]) <= torch.stack(errors).amin(0)).all()
 
 
 def test_rounds_go_on_until_they_bring_less_than_the_tolerance(bench, scene, monkeypatch):

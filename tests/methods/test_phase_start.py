@@ -28,11 +28,6 @@ def test_centring_treats_every_panel_on_its_own(bench, scene):
     assert torch.equal(together[1, 2], with_offset(phase[1, 2], "centre"))
 
 
-def test_no_offset_returns_the_phase_of_the_algorithm():
-    phase = torch.rand(1, 1, 8, 8)
-    assert with_offset(phase, "none") is phase
-
-
 def test_the_offset_leaves_the_ideal_image(bench, scene):
     target = scene(dtype=torch.float64)
     plain, centred = (Wirtinger(iterations=10, offset=o).solve(target, bench)[:, 0] for o in ("none", "centre"))
@@ -43,21 +38,20 @@ def test_the_offset_leaves_the_ideal_image(bench, scene):
     assert (centred - plain).abs().mean() > 0.1
 
 
-def test_a_random_start_is_shared_by_the_batch_and_differs_between_colours(bench, scene):
+def test_a_random_start_is_shared_by_the_batch_and_differs_between_colours_and_cells(bench, scene):
     target = scene(batch=2)[:, 0]
     red, green = (initial_phase("random", target, bench, channel) for channel in (0, 1))
     assert torch.equal(red[0], red[1])
     assert not torch.equal(red, green)
     assert red.min() >= 0
     assert TAU * 0.99 < red.max() <= TAU
+    bench.cell = "another cell"
+    assert not torch.equal(initial_phase("random", target, bench, 0), red)
 
 
-def test_a_narrow_start_spans_one_radian(bench, scene):
+def test_a_narrow_start_spans_one_radian_and_a_constant_one_can_be_changed_image_by_image(bench, scene):
     phase = initial_phase("narrow", scene()[:, 0], bench, 0)
     assert 0.9 < float(phase.max() - phase.min()) <= 1
-
-
-def test_a_start_may_be_changed_in_place_without_touching_its_batch(bench, scene):
     phase = initial_phase("constant", scene(batch=2)[:, 0], bench, 0)
     phase[0] += 1
     assert phase[1].eq(0).all()

@@ -18,7 +18,6 @@ from holobench_eval.metrics.base import (
     gradient_magnitude,
     halved,
     remembered,
-    safe_sqrt,
 )
 
 
@@ -116,14 +115,6 @@ def test_a_gradient_has_the_weights_of_its_operator() -> None:
     for kernel in ("prewitt", "scharr"):
         assert gradient_magnitude(edge, kernel)[0, 0, 2].tolist() == pytest.approx([0, 0, 1, 1, 0, 1], abs=1e-6)
         assert torch.allclose(gradient_magnitude(ramp, kernel)[..., 1:-1, 1:-1], torch.tensor(2.0))
-
-
-def test_a_root_has_no_infinite_slope() -> None:
-    x = torch.tensor([0.0, 4.0], requires_grad=True)
-    root = safe_sqrt(x)
-    root.sum().backward()
-    assert root.tolist() == [0, 2]
-    assert x.grad.tolist() == [0, 0.25]
 
 
 def test_a_blur_keeps_even_light_and_spreads_a_point_by_its_width() -> None:

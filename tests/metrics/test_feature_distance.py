@@ -36,7 +36,7 @@ SERIES: dict[str, list[Callable[[Tensor], Tensor]]] = {
 }
 
 
-@pytest.mark.parametrize("picture", ["astronaut", "camera", "coffee", "chelsea", "rocket", "grass"])
+@pytest.mark.parametrize("picture", ["astronaut", "camera", "grass"])
 @pytest.mark.parametrize("kind", SERIES)
 def test_a_stronger_distortion_is_further_away(photograph: Photograph, picture: str, kind: str) -> None:
     target = photograph(picture, 128)

@@ -12,12 +12,17 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.metrics.lpips import available, find_weights, lpips, lpips_metric
+from holobench_eval.metrics.lpips import Network, available, find_weights, lpips, lpips_metric
 
 Photograph = Callable[..., Tensor]
 
-ALEXNET_CONVOLUTIONS = ((0, 4, 2), (3, 1, 2), (6, 1, 1), (8, 1, 1), (10, 1, 1))
-VGG_CONVOLUTIONS = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
+VGG = (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28)
+# By network: stride and padding of its convolutions, those before which it pools and over how many pixels, those whose
+# outcome is compared.
+TRUNKS = {
+    "alex": ({0: (4, 2), 3: (1, 2), 6: (1, 1), 8: (1, 1), 10: (1, 1)}, (3, 6), 3, (0, 3, 6, 8, 10)),
+    "vgg": (dict.fromkeys(VGG, (1, 1)), (5, 10, 17, 24), 2, (2, 7, 14, 21, 28)),
+}
 
 
 def heads(network: str) -> list[Tensor]:
@@ -33,27 +38,14 @@ def scaled(image: Tensor) -> Tensor:
     return ((2 * image.float() - 1) - shift[:, None, None]) / scale[:, None, None]
 
 
-def alexnet_features(image: Tensor, state: dict[str, Tensor]) -> list[Tensor]:
-    x, features = scaled(image)[None], []
-    for index, stride, padding in ALEXNET_CONVOLUTIONS:
-        if index in (3, 6):
-            x = functional.max_pool2d(x, 3, 2)
+def features(image: Tensor, state: dict[str, Tensor], network: str) -> list[Tensor]:
+    (convolutions, pooled, size, compared), x, found = TRUNKS[network], scaled(image)[None], {}
+    for index, (stride, padding) in convolutions.items():
+        x = functional.max_pool2d(x, size, 2) if index in pooled else x
         weight, bias = state[f"features.{index}.weight"], state[f"features.{index}.bias"]
         x = functional.relu(functional.conv2d(x, weight, bias, stride=stride, padding=padding))
-        features.append(x[0])
-    return features
-
-
-def vgg_features(image: Tensor, state: dict[str, Tensor]) -> list[Tensor]:
-    x, features = scaled(image)[None], []
-    for index in VGG_CONVOLUTIONS:
-        if index in (5, 10, 17, 24):
-            features.append(x[0])
-            x = functional.max_pool2d(x, 2)
-        x = functional.relu(
-            functional.conv2d(x, state[f"features.{index}.weight"], state[f"features.{index}.bias"], padding=1)
-        )
-    return [*features, x[0]]
+        found[index] = x[0]
+    return [found[index] for index in compared]
 
 
 def distance(a: list[Tensor], b: list[Tensor], network: str) -> float:
@@ -64,28 +56,26 @@ def distance(a: list[Tensor], b: list[Tensor], network: str) -> float:
     return total
 
 
-def test_alex_equals_the_formula(photograph: Photograph, random_alexnet: Path) -> None:
-    state = torch.load(random_alexnet, weights_only=True)
-    image, target = photograph("coffee", 96), photograph("chelsea", 96)
-    expected = distance(alexnet_features(image, state), alexnet_features(target, state), "alex")
-    assert expected > 0.01
-    assert float(lpips(image, target, "alex", random_alexnet)) == pytest.approx(expected, rel=1e-5)
-
-
-def test_vgg_equals_the_formula(photograph: Photograph, tmp_path: Path) -> None:
-    generator = torch.Generator().manual_seed(4)
-    state, into = {}, 3
-    for index, out in zip(
-        VGG_CONVOLUTIONS, (64, 64, 128, 128, 256, 256, 256, 512, 512, 512, 512, 512, 512), strict=True
-    ):
-        state[f"features.{index}.weight"] = torch.randn(out, into, 3, 3, generator=generator) * (2 / (9 * into)) ** 0.5
+def random_vgg(folder: Path) -> Path:
+    draw, state, into = torch.Generator().manual_seed(4), {}, 3
+    for index, out in zip(VGG, (64, 64, 128, 128, 256, 256, 256, *6 * [512]), strict=True):
+        state[f"features.{index}.weight"] = torch.randn(out, into, 3, 3, generator=draw) * (2 / (9 * into)) ** 0.5
         state[f"features.{index}.bias"] = torch.zeros(out)
         into = out
-    torch.save(state, tmp_path / "vgg16-random.pth")
-    image, target = photograph("coffee", 32), photograph("chelsea", 32)
-    expected = distance(vgg_features(image, state), vgg_features(target, state), "vgg")
+    torch.save(state, folder / "vgg16-random.pth")
+    return folder / "vgg16-random.pth"
+
+
+@pytest.mark.parametrize(("network", "side"), [("alex", 96), ("vgg", 32)])
+def test_it_equals_the_formula(
+    photograph: Photograph, random_alexnet: Path, tmp_path: Path, network: Network, side: int
+) -> None:
+    path = random_alexnet if network == "alex" else random_vgg(tmp_path)
+    state = torch.load(path, weights_only=True)
+    pair = photograph("coffee", side), photograph("chelsea", side)
+    expected = distance(*(features(image, state, network) for image in pair), network)
     assert expected > 0.01
-    assert float(lpips(image, target, "vgg", tmp_path)) == pytest.approx(expected, rel=1e-5)
+    assert float(lpips(*pair, network, path if network == "alex" else tmp_path)) == pytest.approx(expected, rel=1e-5)
 
 
 def test_without_weights_there_is_a_reason_and_no_number(
@@ -108,26 +98,18 @@ def test_the_hub_cache_is_searched(random_alexnet: Path, tmp_path: Path, monkeyp
     assert find_weights("vgg") is None
 
 
-@pytest.mark.parametrize("content", ["not a checkpoint", "a list", "wrong layers", "nan", "code"])
-def test_a_bad_file_is_refused_in_one_line(
-    photograph: Photograph, random_alexnet: Path, tmp_path: Path, content: str
-) -> None:
-    path = tmp_path / "alexnet-bad.pth"
+def test_a_bad_file_is_refused_in_one_line(photograph: Photograph, random_alexnet: Path, tmp_path: Path) -> None:
     state = torch.load(random_alexnet, weights_only=True)
-    if content == "not a checkpoint":
-        path.write_bytes(b"<html>404</html>")
-    elif content == "a list":
-        torch.save([1, 2], path)
-    elif content == "wrong layers":
-        torch.save({key: value for key, value in state.items() if "10" not in key}, path)
-    elif content == "nan":
-        torch.save(state | {"features.0.bias": torch.full((64,), torch.nan)}, path)
-    else:
-        torch.save(torch.nn.Linear(2, 2), path)  # a pickled object: loading it would run code
-    with pytest.raises(UserError) as caught:
-        lpips(photograph("coffee", 64), photograph("chelsea", 64), "alex", path)
-    assert "\n" not in str(caught.value)
-    assert str(path) in str(caught.value)
+    fewer = {key: value for key, value in state.items() if "10" not in key}
+    infinite = state | {"features.0.bias": torch.full((64,), torch.nan)}
+    # no checkpoint at all, and a pickled object: loading it would run code
+    for number, content in enumerate((b"<html>404</html>", [1, 2], fewer, infinite, torch.nn.Linear(2, 2))):
+        path = tmp_path / f"alexnet-bad{number}.pth"
+        path.write_bytes(content) if isinstance(content, bytes) else torch.save(content, path)
+        with pytest.raises(UserError) as caught:
+            lpips(photograph("coffee", 64), photograph("chelsea", 64), "alex", path)
+        assert "\n" not in str(caught.value)
+        assert str(path) in str(caught.value)
 
 
 def test_a_place_that_does_not_exist_or_has_another_name_is_refused(tmp_path: Path) -> None:

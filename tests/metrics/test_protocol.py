@@ -46,13 +46,17 @@ def test_match_is_the_least_squares_factor_of_each_channel(capture: Tensor, targ
     assert torch.allclose(image, (factors.view(3, 1, 1) * capture).clamp(0, 1))
 
 
-def test_a_black_channel_stays_black_with_factor_zero(target: Tensor) -> None:
+def test_a_black_channel_stays_black_with_factor_zero_and_a_black_capture_has_finite_scores(target: Tensor) -> None:
     dark = target.clone()
     dark[1] = 0
     image, factors = match(dark, target)
     assert float(factors[1]) == 0.0
     assert not bool(image[1].any())
     assert bool(image.isfinite().all())
+    scores = score(torch.zeros_like(target), target)
+    assert all(math.isfinite(value) for value in scores.values())
+    assert scores["brightness_ratio"] == 0.0
+    assert "speckle_contrast" not in scores
 
 
 @settings(max_examples=15, deadline=None)
@@ -92,15 +96,8 @@ def test_all_columns_are_there_finite_and_have_a_direction(
     assert all(math.isfinite(value) for value in scores.values())
     full_reference = {f"{m.name}_{domain}" for m in catalogue() for domain in m.domains if m.name != "lpips_vgg"}
     repeated = {f"{name}_linear_{tail}" for name in QUICK for tail in ("refined", "blur0.5", "blur1")}
-    described = {
-        "refine_dx_px",
-        "refine_dy_px",
-        "refine_theta_deg",
-        "brightness_ratio",
-        "scale_0",
-        "scale_1",
-        "scale_2",
-    }
+    described = {"refine_dx_px", "refine_dy_px", "refine_theta_deg", "brightness_ratio"}
+    described |= {f"scale_{channel}" for channel in range(3)}
     judged = full_reference | repeated | {"speckle_contrast"}
     assert set(scores) == judged | described
     assert all(direction(column) is not None for column in judged)
@@ -109,26 +106,14 @@ def test_all_columns_are_there_finite_and_have_a_direction(
     assert direction("mofd_srgb") == "lower"
 
 
-def test_an_all_black_capture_gives_finite_scores(target: Tensor) -> None:
-    scores = score(torch.zeros_like(target), target)
-    assert all(math.isfinite(value) for value in scores.values())
-    assert scores["brightness_ratio"] == 0.0
-    assert "speckle_contrast" not in scores
-
-
-def test_a_black_target_is_refused(capture: Tensor, target: Tensor) -> None:
-    with pytest.raises(ValueError, match="the target is black; expected light in at least one of its colours"):
-        score(capture, torch.zeros_like(target))
-
-
 @pytest.fixture
 def red(target: Tensor) -> Tensor:
     """With light in its first colour alone."""
     return target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
 
 
-@pytest.mark.parametrize("unit", [1e-30, 1.0, 1e30])
-@pytest.mark.parametrize("leak", [0.0, 0.1, 1.0, 10.0])
+@pytest.mark.parametrize("unit", [1e-30, 1e30])
+@pytest.mark.parametrize("leak", [0.0, 1.0, 10.0])
 def test_light_where_the_target_is_black_is_an_error_at_the_factor_of_the_colours_that_have_light(
     capture: Tensor, red: Tensor, leak: float, unit: float
 ) -> None:
@@ -151,39 +136,8 @@ def test_two_colours_with_light_give_a_black_one_their_mean_factor(capture: Tens
     assert min(own[0], own[2]) < factors[1] < max(own[0], own[2])
 
 
-def test_a_leak_in_a_nearly_black_colour_hides_none_in_a_black_one(capture: Tensor, red: Tensor) -> None:
-    shown, wanted = capture.clone(), red.clone()
-    shown[1:] = 10 * shown[0]
-    wanted[1] = 0.01 * red[0]
-    assert float(match(shown, wanted)[1][2]) > 0.98 * float(match(shown, red)[1][2])
-
-
-def test_a_few_pixels_that_are_not_black_forgive_no_leak(capture: Tensor, red: Tensor) -> None:
-    shown = capture.clone()
-    shown[1:] = shown[0]
-    black = score(shown, red, metrics=("psnr",))["psnr_linear"]
-    forgiven = []
-    for pixels in (1, 4, 16):
-        wanted = red.clone()
-        wanted[1:, 80, 80 : 80 + pixels] = 1.0
-        forgiven.append(score(shown, wanted, metrics=("psnr",))["psnr_linear"] - black)
-    assert forgiven == sorted(forgiven)
-    assert forgiven[0] < 0.2
-    assert forgiven[-1] < 2
-
-
-def test_a_colour_with_a_twentieth_of_the_brightest_s_light_has_a_factor_of_its_own(
-    capture: Tensor, target: Tensor
-) -> None:
-    light = target.mean((1, 2), keepdim=True)
-    dim = target * torch.tensor([1.0, 0.0500001, 0.0500001]).view(3, 1, 1) * light[0] / light
-    _, factors = match(capture, dim)
-    own = (capture * dim).sum((1, 2)) / capture.square().sum((1, 2))
-    assert torch.allclose(factors, own, rtol=1e-12, atol=0)
-
-
-@pytest.mark.parametrize("part", [0.02, 0.03, 0.04])
-def test_a_colour_below_a_twentieth_has_its_own_factor_in_proportion_to_its_light(
+@pytest.mark.parametrize("part", [0.02, 0.04, 0.0500001])
+def test_a_colour_below_a_twentieth_of_the_brightest_has_its_own_factor_in_proportion_to_its_light(
     capture: Tensor, target: Tensor, part: float
 ) -> None:
     light = target.mean((1, 2), keepdim=True)
@@ -191,7 +145,7 @@ def test_a_colour_below_a_twentieth_has_its_own_factor_in_proportion_to_its_ligh
     _, factors = match(capture, dim)
     own = (capture * dim).sum((1, 2)) / capture.square().sum((1, 2))
     weights = dim.mean((1, 2))
-    common, share = weights @ own / weights.sum(), part / 0.05
+    common, share = weights @ own / weights.sum(), min(part / 0.05, 1)
     assert torch.allclose(factors[1:], share * own[1:] + (1 - share) * common, rtol=1e-6, atol=0)
 
 
@@ -211,15 +165,7 @@ def test_brightness_ratio_is_taken_before_the_match(target: Tensor) -> None:
     scores = score(4 * target, target, metrics=("psnr",), refine=False, blur=())
     assert scores["brightness_ratio"] == pytest.approx(4.0)
     assert scores["scale_2"] == pytest.approx(0.25)
-    assert set(scores) == {
-        "psnr_linear",
-        "psnr_amplitude",
-        "psnr_srgb",
-        "brightness_ratio",
-        "scale_0",
-        "scale_1",
-        "scale_2",
-    }
+    assert len(scores) == 3 + 1 + 3
 
 
 def test_refinement_finds_a_shift_and_reports_it(photograph: Photograph) -> None:
@@ -229,14 +175,6 @@ def test_refinement_finds_a_shift_and_reports_it(photograph: Photograph) -> None
     assert scores["refine_dx_px"] == pytest.approx(1.0, abs=0.05)
     assert scores["refine_dy_px"] == pytest.approx(0.0, abs=0.05)
     assert scores["psnr_linear_refined"] > scores["psnr_linear"] + 10
-
-
-def test_refinement_never_uses_the_unmatched_brightness_of_a_channel(target: Tensor, capture: Tensor) -> None:
-    plain, tinted = (
-        score(capture * torch.tensor(gain).view(3, 1, 1), target, metrics=QUICK)
-        for gain in ([1.0, 1.0, 1.0], [1.0, 1.0, 1e4])
-    )
-    assert tinted["refine_dx_px"] == pytest.approx(plain["refine_dx_px"], abs=1e-4)
 
 
 def test_blur_is_applied_to_both_before_the_match(capture: Tensor, target: Tensor) -> None:
@@ -294,6 +232,8 @@ def test_wrong_shapes_ranges_and_names_are_errors(capture: Tensor, target: Tenso
         score(capture[:, :9], target[:, :9])
     with pytest.raises(ValueError, match="target values"):
         score(capture, 255 * target)
+    with pytest.raises(ValueError, match="the target is black; expected light in at least one of its colours"):
+        score(capture, torch.zeros_like(target))
     with pytest.raises(ValueError, match="blur width"):
         score(capture, target, metrics=QUICK, blur=(0.0,))
     with pytest.raises(UserError, match="did you mean 'psnr'"):

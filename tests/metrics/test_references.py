@@ -21,14 +21,8 @@ def targets(photograph: Photograph) -> list[Tensor]:
 
 def test_rows_have_their_names_and_the_targets_shape(targets: list[Tensor]) -> None:
     captures = floor_captures(targets[0], targets[1:], "astronaut")
-    assert set(captures) == {
-        "floor_constant",
-        "floor_black",
-        "floor_speckle",
-        "floor_wrong_target",
-        "floor_mirrored",
-        "floor_shift_1px",
-    }
+    names = ("constant", "black", "speckle", "wrong_target", "mirrored", "shift_1px")
+    assert set(captures) == {f"floor_{name}" for name in names}
     for capture in (made() for made in captures.values()):
         assert capture.shape == targets[0].shape
         assert capture.dtype == targets[0].dtype

@@ -10,7 +10,6 @@ from holobench_eval.optics.kernel.sizes import fast_size
 from holobench_eval.optics.padding import (
     DEFAULT_ERROR,
     IRIS_EDGE,
-    REFERENCE_ERROR,
     padded_shape,
     padded_size,
     spread,
@@ -58,26 +57,11 @@ def test_the_default_is_the_smallest_size_that_keeps_the_error_in_both_axes(size
     assert fast_size(enough) <= padded_size(size, reach, None, None) <= fast_size(enough + 1 + enough // 256)
 
 
-def test_a_soft_iris_needs_room_for_the_spread_and_its_own_tails():
-    assert padded_size(256, 99.5, 40, None) == fast_size(256 + 100 + 40)
-    rows, columns = padded_shape((100, 200), PITCH, WAVELENGTH, 0.01, 0.5, None)
-    reach = math.ceil(spread(PITCH, WAVELENGTH, 0.01, 0.5))
-    assert (rows, columns) == (fast_size(100 + reach + 52), fast_size(200 + reach + 52))
-
-
 @pytest.mark.parametrize("pupil", [0.96, 1.5])
 def test_an_iris_as_wide_as_the_band_pads_as_none_does(pupil):
     assert padded_shape((100, 200), PITCH, WAVELENGTH, 0.01, pupil, None) == padded_shape(
         (100, 200), PITCH, WAVELENGTH, 0.01, None, None
     )
-
-
-@pytest.mark.parametrize(("size", "reach"), [(64, 64.0), (64, 65.0), (64, 150.0), (64, 300.0), (100, 300.0)])
-def test_the_reference_is_four_times_the_size_and_larger_where_light_spreads_further(size, reach):
-    samples = padded_size(size, reach, None, "reference")
-    wanted = REFERENCE_ERROR / math.sqrt(2)
-    enough = next((n for n in range(4 * size, 10**4) if tail_error(size, reach, n) <= wanted), 0) if reach > size else 0
-    assert max(4 * size, enough) <= samples <= max(4 * size, fast_size(enough + size // 2))
 
 
 def test_so_many_samples_are_added_as_are_asked_for():

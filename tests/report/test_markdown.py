@@ -29,11 +29,8 @@ def test_ordinary_text_stays_legible():
         assert str(escape(text)) == text
 
 
-def test_text_that_was_made_here_is_not_escaped_again():
-    assert str(escape(Markdown("**n**"))) == "**n**"
-
-
 def test_what_is_joined_or_formatted_into_markdown_is_escaped_once():
+    assert str(escape(Markdown("**n**"))) == "**n**"
     assert Markdown("**{}.** {}").format("a | b", Markdown("`c`")) == "**a \\| b.** `c`"
     assert bullets(["*a*", Markdown("*b*")]) == "- \\*a\\*\n- *b*"
     assert blocks(["a\nb", "", None, bullets([]), "<i>"]) == "a b\n\n&lt;i>"

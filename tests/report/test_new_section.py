@@ -46,29 +46,22 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sections, "NAMES", (*sections.NAMES, "brightness"))
 
 
-def text_of(tmp_path: Path, condition: str) -> str:
-    pairs = tuple((label, condition) for label in ("GS", "Wirtinger"))
+@pytest.mark.usefixtures("added")
+@pytest.mark.parametrize("condition", ["ideal", "leto-aged"])
+def test_a_file_and_a_line_add_a_section_at_its_place_where_it_applies(tmp_path: Path, condition: str) -> None:
     records = [
         synthetic.record(label, synthetic.cell(label, target, condition), {"psnr_linear": 20.0})
-        for label, _ in pairs
+        for label in ("GS", "Wirtinger")
         for target in synthetic.TARGETS
     ]
-    layout = synthetic.layout(pairs=pairs, reported={}, privileged=frozenset())
-    return whole(write_report(layout, records, tmp_path / "report", {}, Description())[0])
-
-
-def test_a_file_and_a_line_add_a_section_at_its_place_with_numbered_figures(added: None, tmp_path: Path) -> None:
-    text = text_of(tmp_path, "ideal")
+    layout = synthetic.results(records).layout
+    text = whole(write_report(layout, records, tmp_path / "report", {}, Description())[0])
+    applies = condition == "ideal"
     headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-    assert headings[:3] == ["Answer", r"Brightness \| of captures", "Limits"]
-    assert "\n- GS: \\*6\\* targets\n- Wirtinger: \\*6\\* targets\n" in text
-    assert "![Figure 2](figures/brightness.png)\n\n**Figure 2.** Nothing yet.\n" in text
-    assert (tmp_path / "report" / "figures" / "brightness.png").is_file()
-
-
-def test_a_section_that_does_not_apply_leaves_nothing(added: None, tmp_path: Path) -> None:
-    assert "Brightness" not in text_of(tmp_path, "leto-aged")
-    assert not (tmp_path / "report" / "figures" / "brightness.png").exists()
+    assert headings[:2] == ["Answer", r"Brightness \| of captures" if applies else "Limits"]
+    assert ("\n- GS: \\*6\\* targets\n- Wirtinger: \\*6\\* targets\n" in text) == applies
+    assert ("![Figure 2](figures/brightness.png)\n\n**Figure 2.** Nothing yet.\n" in text) == applies
+    assert (tmp_path / "report" / "figures" / "brightness.png").is_file() == applies
 
 
 def test_every_file_of_sections_is_in_the_list_and_no_two_sections_share_a_place() -> None:

@@ -4,7 +4,9 @@ import hashlib
 import json
 import os
 import pickle
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import torch
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.displays import Preparation
 from tests.support.trained_study import (
     artifact_of,
     assert_refused,
@@ -21,13 +24,12 @@ from tests.support.trained_study import (
     needs,
     rounds,
     write,
-    write_profile,
 )
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
 
-def test_an_artifact_says_what_it_was_made_for_and_what_it_took(tmp_path: Path) -> None:
+def test_an_artifact_says_what_it_was_made_for_and_is_made_once_for_all_studies_that_need_it(tmp_path: Path) -> None:
     config = write(tmp_path)
     outcome = compute(config)
     assert outcome.failed == 0
@@ -40,61 +42,39 @@ def test_an_artifact_says_what_it_was_made_for_and_what_it_took(tmp_path: Path) 
     assert outcome.records[-1]["learned"] == learned
     assert all(record["learned"] is None for record in outcome.records[:-1])
     assert {path.name for path in artifact_of(config).iterdir()} == {STATE, PROVENANCE, "training.csv", ".lock"}
-
-
-def test_an_artifact_is_made_once_for_all_studies_that_need_it(tmp_path: Path) -> None:
-    first = compute(write(tmp_path))
     again = compute(write(tmp_path, ("count: 1", "count: 2")), "other")
     assert rounds(tmp_path) == [0, 1]
-    assert again.records[-1]["learned"] == first.records[-1]["learned"]
+    assert again.records[-1]["learned"] == learned
 
 
-def test_retraining_makes_an_artifact_again_and_only_the_cells_that_depend_on_it(tmp_path: Path) -> None:
-    config = write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
-    first = compute(config)
-    again = compute(config, retrain=True)
-    assert rounds(tmp_path) == [0, 1, 0, 1]
-    assert (first.computed, again.computed) == (7, 1)
-    assert again.records[-1]["scores"] == first.records[-1]["scores"]
-
-
-def panel(folder: Path) -> tuple[str, str]:
-    return "panel: [128, 128]", "panel: [128, 192]"
-
-
-def wavelength(folder: Path) -> tuple[str, str]:
-    return write_profile(folder, ("5.17e-7", "5.32e-7"))
-
-
-def version(folder: Path) -> tuple[str, str]:
-    return write_profile(folder, ("version: 1", "version: 2"))
+@pytest.fixture(scope="module")
+def needed(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
+    """What a study has to learn."""
+    (needed,) = needs(write(tmp_path_factory.mktemp("needed")))
+    return needed
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("spec", "version", "words"),
     [
-        (panel, "panel [128, 128], this study needs [128, 192]"),
-        (wavelength, "wavelengths [6.36e-07, 5.17e-07, 4.46e-07], this study needs [6.36e-07, 5.32e-07, 4.46e-07]"),
-        (version, "profile version 1, this study needs 2"),
+        ({"shape": (128, 192)}, 1, "panel [128, 128], this study needs [128, 192]"),
+        (
+            {"wavelengths": (6.36e-7, 5.32e-7, 4.46e-7)},
+            1,
+            "wavelengths [6.36e-07, 5.17e-07, 4.46e-07], this study needs [6.36e-07, 5.32e-07, 4.46e-07]",
+        ),
+        ({}, 2, "profile version 1, this study needs 2"),
     ],
 )
 def test_an_artifact_that_was_learned_for_another_display_is_refused(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    change: Callable[[Path], tuple[str, str]],
-    words: str,
+    tmp_path: Path, needed: Preparation, spec: dict[str, Any], version: int, words: str
 ) -> None:
-    own = write_profile(tmp_path)
-    config = write(tmp_path, own)
-    compute(config)
-    made = artifact_of(config)
-    different = change(tmp_path)
-    config = write(tmp_path, *{own, different})
-    made.rename(artifact_of(config))
-    capsys.readouterr()
-    assert_refused(holoeval(monkeypatch, config), capsys.readouterr(), artifact_of(config).name, "trained for", words)
-    assert holoeval(monkeypatch, config, "--retrain") == 0
+    display = replace(needed.display, version=version, spec=replace(needed.display.spec, **spec))
+    other, artifacts = replace(needed, display=display), Artifacts(tmp_path)
+    artifacts.write(needed, {}, {"captures": 2, "seconds": 0.5})
+    artifacts.folder_of(needed).rename(artifacts.folder_of(other))
+    with pytest.raises(UserError, match=re.escape(f"{artifacts.folder_of(other)}: trained for {words}; delete it, or")):
+        artifacts.load(other)
 
 
 class Code:
@@ -110,10 +90,6 @@ class Code:
 def truncated(place: Path) -> None:
     content = (place / STATE).read_bytes()
     (place / STATE).write_bytes(content[: len(content) // 2])
-
-
-def emptied(place: Path) -> None:
-    (place / STATE).write_bytes(b"")
 
 
 def with_code(place: Path) -> None:
@@ -150,42 +126,42 @@ def edited_description(place: Path) -> None:
     edit(place, description=known | {"seed": 4})
 
 
-DAMAGES: list[tuple[Callable[[Path], None], str]] = [
+def values(**changes: Any) -> Callable[[Path], None]:
+    return lambda place: edit(place, **changes)
+
+
+def content(name: str, text: bytes) -> Callable[[Path], Any]:
+    return lambda place: (place / name).write_bytes(text)
+
+
+DAMAGES: list[tuple[Callable[[Path], Any], str]] = [
     (truncated, "damaged, or not a file of tensors"),
-    (emptied, "damaged, or not a file of tensors"),
+    (content(STATE, b""), "damaged, or not a file of tensors"),
     (with_code, "damaged, or not a file of tensors"),
     (with_code_saved_by_torch, "damaged, or not a file of tensors"),
     (another_state, "is not the file that provenance.json describes"),
     (gone, "learned.pt or provenance.json is missing"),
     (no_state, "of another version"),
     (edited_description, "trained for seed 4, this study needs 3"),
-    (lambda place: edit(place, description={}), "trained for method null"),
-    (lambda place: edit(place, sha256="0" * 64), "is not the file"),
-    (lambda place: void((place / LOG).write_text("round\n1\n")), "training.csv: is not the file that provenance.json"),
-    (lambda place: edit(place, log_sha256=None), "no valid 'log_sha256'"),
-    (lambda place: edit(place, format=None), "of another version"),
-    (lambda place: edit(place, format=2), "of another version"),
-    (lambda place: edit(place, description=None), "no valid 'description'"),
-    (lambda place: edit(place, sha256=None), "no valid 'sha256'"),
-    (lambda place: edit(place, captures=None), "no valid 'captures'"),
-    (lambda place: edit(place, captures="few"), "no valid 'captures'"),
-    (lambda place: edit(place, seconds=None), "no valid 'seconds'"),
-    (lambda place: void((place / PROVENANCE).write_text("{")), "not an artifact's provenance"),
-    (lambda place: void((place / PROVENANCE).write_text("[1]")), "not an artifact's provenance"),
-    (lambda place: void((place / PROVENANCE).write_text("[" * 100_000)), "not an artifact's provenance"),
-    (lambda place: void((place / PROVENANCE).write_bytes(b"\xff\xfe{")), "not an artifact's provenance"),
+    (values(description={}), "trained for method null"),
+    (values(sha256="0" * 64), "is not the file"),
+    (content(LOG, b"round\n1\n"), "training.csv: is not the file that provenance.json"),
+    (values(format=None), "of another version"),
+    (values(format=2), "of another version"),
+    *((values(**{key: None}), f"no valid '{key}'") for key in ("description", "sha256", "log_sha256", "captures")),
+    (values(captures="few"), "no valid 'captures'"),
+    (values(seconds=None), "no valid 'seconds'"),
+    *(
+        (content(PROVENANCE, text), "not an artifact's provenance")
+        for text in (b"{", b"[1]", b"[" * 100_000, b"\xff\xfe{")
+    ),
 ]
-
-
-def void(_: object) -> None:
-    """For the lambdas above, which give nothing."""
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES)
 def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
-    tmp_path: Path, damage: Callable[[Path], None], words: str
+    tmp_path: Path, needed: Preparation, damage: Callable[[Path], None], words: str
 ) -> None:
-    (needed,) = needs(write(tmp_path))
     artifacts = Artifacts(tmp_path / "artifacts")
     artifacts.write(needed, {"gain": torch.ones(3)}, {"captures": 2, "seconds": 0.5})
     assert artifacts.load(needed).state["gain"].tolist() == [1, 1, 1]
@@ -199,21 +175,18 @@ def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
     assert not (place / "entered").exists()
 
 
-@pytest.mark.parametrize("damage", [truncated, with_code, edited_description])
-def test_a_run_with_a_damaged_artifact_ends_with_one_line_and_exit_code_2(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    damage: Callable[[Path], None],
+def test_a_run_with_a_hostile_artifact_ends_with_one_line_and_exit_code_2_unless_it_trains_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    config = write(tmp_path)
-    compute(config)
-    damage(artifact_of(config))
+    compute(write(tmp_path))
     other = write(tmp_path, ("count: 1", "count: 2"))
+    place = artifact_of(other)
+    with_code(place)
     capsys.readouterr()
-    assert_refused(holoeval(monkeypatch, other), capsys.readouterr(), str(artifact_of(config)))
-    assert not (artifact_of(config) / "entered").exists()
+    assert_refused(holoeval(monkeypatch, other), capsys.readouterr(), str(place), "run again")
+    assert not (place / "entered").exists()
     assert rounds(tmp_path) == [0, 1]
+    assert holoeval(monkeypatch, other, "--retrain") == 0
 
 
 def test_an_unfinished_value_that_is_damaged_is_refused(tmp_path: Path) -> None:

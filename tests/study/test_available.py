@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,7 +8,6 @@ import torch
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from holobench_eval.study.run import Outcome
 from tests.study.test_run import compute
 from tests.support.fake_study import solves, write_config
 
@@ -30,26 +27,18 @@ class Needy(Toy):
 '''
 
 
-def needy(tmp_path: Path) -> Callable[[], Outcome]:
-    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy"))
-    plugins = tmp_path / "plugins.py"
-    plugins.write_text(plugins.read_text() + NEEDY)
-
-    return partial(compute, config, tmp_path / "out")
-
-
-def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed_unless_nothing_is_left_for_it(
+    tmp_path: Path,
+) -> None:
+    config, here = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
+    (tmp_path / "plugins.py").write_text((tmp_path / "plugins.py").read_text() + NEEDY)
     with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
-        needy(tmp_path)()
+        compute(config, tmp_path / "out")
     assert solves(tmp_path) == []
-
-
-def test_what_was_computed_needs_no_method_any_more(tmp_path: Path) -> None:
-    run = needy(tmp_path)
-    (tmp_path / "here").touch()
-    run()
-    (tmp_path / "here").unlink()
-    run()
+    here.touch()
+    compute(config, tmp_path / "out")
+    here.unlink()
+    compute(config, tmp_path / "out")
     assert len(solves(tmp_path)) == 6
 
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,48 +18,44 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
+from holobench_eval.core.errors import BudgetError
 
 
 @dataclass(frozen=True)
-class Greedy:
-    \"\"\"Captures for ever; hands in a phase of ``good`` first and of 9 after every other capture.\"\"\"
-
-    good: float = 2.0
+class Method:
     keeps: bool = True
     camera: ClassVar[bool] = True
 
+    def phase(self, target, bench):
+        return torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
+
+
+class Greedy(Method):
+    \"\"\"Captures for ever; hands in its phase first, and other ones never.\"\"\"
+
     def solve(self, target, bench):
-        phase = torch.full((target.shape[1], *bench.spec.shape), self.good)
+        phase = self.phase(target, bench)[0]
+        if self.keeps:
+            bench.keep(phase)
         while True:
-            if self.keeps:
-                bench.keep(phase)
             bench.capture(phase)
             phase.fill_(9.0)  # what was handed in is a copy
-            self = Greedy(self.good, keeps=False)
 
 
-@dataclass(frozen=True)
-class Modest:
+class Modest(Method):
     \"\"\"Takes as many captures as it may, and no more.\"\"\"
 
-    value: float = 2.0
-    camera: ClassVar[bool] = True
-
     def solve(self, target, bench):
-        phase = torch.full((*target.shape[:2], *bench.spec.shape), self.value)
         for _ in range(bench.budget or 1):
-            bench.capture(phase[0])
-        return phase
+            bench.capture(self.phase(target, bench)[0])
+        return self.phase(target, bench)
 
 
-@dataclass(frozen=True)
-class Deaf:
-    \"\"\"Goes on after the display has ended it; hands in a phase of 2 and returns one of 9.\"\"\"
-
-    camera: ClassVar[bool] = True
+class Deaf(Method):
+    \"\"\"Goes on after the display has ended it, and returns another phase than it has handed in.\"\"\"
 
     def solve(self, target, bench):
-        phase = torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
+        phase = self.phase(target, bench)
         bench.keep(phase)
         try:
             while True:
@@ -69,16 +64,11 @@ class Deaf:
             return phase.fill_(9.0)
 
 
-@dataclass(frozen=True)
-class Lying:
+class Lying(Method):
     \"\"\"Says of itself that the display has ended it.\"\"\"
 
-    camera: ClassVar[bool] = True
-
     def solve(self, target, bench):
-        from holobench_eval.core.errors import BudgetError
-
-        bench.keep(torch.zeros(target.shape[1], *bench.spec.shape))
+        bench.keep(self.phase(target, bench)[0])
         raise BudgetError("the best of all methods")
 """
 
@@ -88,48 +78,28 @@ def study_of(folder: Path, *methods: str) -> Path:
     return write_config(folder, tuple(f"{{name: camera.py:{method}}}" for method in methods), count=1)
 
 
-def records(config: Path, output: Path) -> list[dict[str, Any]]:
-    return [record for record in compute(config, output).records if record["cell"]["condition"] != "reference"]
-
-
-def test_a_method_over_its_budget_is_stopped_and_its_best_hologram_so_far_is_scored(tmp_path: Path) -> None:
-    config = study_of(tmp_path, "Greedy, captures: 3", "Modest, captures: 3")
-    greedy, modest = records(config, tmp_path / "out")
-    assert (greedy["state"], greedy["captures"]) == ("done", 3)
-    assert greedy["stopped"] == "Greedy has used its 3 captures"
-    assert greedy["scores"] == modest["scores"]
+def test_a_method_over_its_budget_is_stopped_by_the_display_alone_and_its_best_hologram_so_far_is_scored(
+    tmp_path: Path,
+) -> None:
+    methods = [f"{name}, captures: 3" for name in ("Greedy", "Deaf", "Modest")]
+    config = study_of(tmp_path, *methods, "Greedy, label: none, captures: 2, params: {keeps: false}", "Lying")
+    found = compute(config, tmp_path / "out").records
+    greedy, deaf, modest, none, lying = (record for record in found if record["cell"]["condition"] != "reference")
+    for stopped in (greedy, deaf):
+        assert (stopped["state"], stopped["captures"], stopped["scores"]) == ("done", 3, modest["scores"])
+        assert stopped["stopped"] == f"{stopped['label']} has used its 3 captures"
     assert (modest["captures"], modest["stopped"]) == (3, "")
+    assert (none["state"], none["reason"]) == ("failed", "none has used its 2 captures")
+    assert (lying["state"], lying.get("stopped", "")) == ("failed", "")
 
 
-def test_a_method_that_does_not_heed_the_end_of_its_budget_is_stopped_all_the_same(tmp_path: Path) -> None:
-    deaf, modest = records(study_of(tmp_path, "Deaf, captures: 3", "Modest, captures: 3"), tmp_path / "out")
-    assert (deaf["stopped"], deaf["captures"]) == ("Deaf has used its 3 captures", 3)
-    assert deaf["scores"] == modest["scores"]
-
-
-def test_only_the_display_ends_a_budget(tmp_path: Path) -> None:
-    (record,) = records(study_of(tmp_path, "Lying"), tmp_path / "out")
-    assert (record["state"], record.get("stopped", "")) == ("failed", "")
-
-
-def test_a_method_that_kept_nothing_fails_when_its_budget_ends(tmp_path: Path) -> None:
-    config = study_of(tmp_path, "Greedy, captures: 2, params: {keeps: false}")
-    (record,) = records(config, tmp_path / "out")
-    assert record["state"] == "failed"
-    assert record["reason"] == "Greedy has used its 2 captures"
-
-
-def test_a_budget_makes_another_phase_and_no_budget_leaves_its_name_as_it_was(tmp_path: Path) -> None:
-    free, tight = "Modest", "Modest, label: tight, captures: 2"
-    cells = {task.label: task.cells[0] for task in plan(load_study(study_of(tmp_path, free, tight))).tasks}
-    assert "captures" not in cells["Modest"].phase
-    assert cells["tight"].phase == {**cells["Modest"].phase, "captures": 2}
-    assert cells["tight"].id != cells["Modest"].id
-
-
-def test_a_time_is_kept_for_each_budget(tmp_path: Path) -> None:
+def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path: Path) -> None:
     many = ("Modest", "Modest, label: two, captures: 2", "Modest, label: three, captures: 3")
     tasks = [task for task in plan(load_study(study_of(tmp_path, *many))).tasks if not task.is_floor]
+    free, two, _ = (task.cells[0] for task in tasks)
+    assert "captures" not in free.phase
+    assert two.phase == {**free.phase, "captures": 2}
+    assert two.id != free.id
     assert len({cost.key(task, 1, 1) for task in tasks}) == 3
 
 

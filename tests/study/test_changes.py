@@ -70,29 +70,24 @@ def test_a_value_replaces_that_of_the_config_and_its_defaults(tmp_path: Path) ->
 
 def test_methods_may_be_set_as_a_config_writes_them_and_then_chosen(tmp_path: Path) -> None:
     path = write(tmp_path, FULL.replace("baseline: GS\n", "").replace("GS: {psnr", "wirtinger: {psnr"))
-    changes = Changes(values=("methods=[wirtinger, sgd, {name: hio, label: HIO}]",))
-    assert load_study(path, changes).labels == ("wirtinger", "sgd", "HIO")
-    study = load_study(path, Changes(("HIO,wirtinger",), values=changes.values))
-    assert study.labels == ("wirtinger", "HIO")
+    values = ("methods=[wirtinger, sgd, {name: hio, label: HIO}]",)
+    assert load_study(path, Changes(values=values)).labels == ("wirtinger", "sgd", "HIO")
+    assert load_study(path, Changes(("HIO,wirtinger",), values=values)).labels == ("wirtinger", "HIO")
 
 
 FAULTS = [
     (Changes(values=("seed=-1",)), "--set seed=-1: seed should be greater than or equal to 0, got -1"),
-    (Changes(values=("sede=3",)), "--set sede=3: unknown key 'sede' in the document; did you mean 'seed'?"),
     (Changes(values=("saves.phases=true",)), "--set saves.phases=true: unknown key 'saves' in the document"),
     (Changes(values=("methods.1.params.iterations=0",)), "--set methods.1.params.iterations=0: method 'gerchberg_sax"),
-    (Changes(values=("methods.1.params.itterations=9",)), "--set methods.1.params.itterations=9: method 'gerchberg"),
     (Changes(values=("display.profiles.0=idael",)), "--set display.profiles.0=idael: unknown profile 'idael'; did"),
     (Changes(values=("display={profiles: [idael]}",)), "--set display={profiles: [idael]}: unknown profile 'idael'"),
     (Changes(values=("methods.7.label=x",)), "--set methods.7.label=x: 'methods' is a list; give a number from 0 to 1"),
     (Changes(values=("seed.x=1",)), "--set seed.x=1: 'seed' is a single value and has no 'x'"),
     (Changes(values=("seed",)), "--set seed: expected key=value, such as"),
-    (Changes(values=("=3",)), "--set =3: expected key=value, such as"),
     (Changes(values=("seed=[",)), "--set seed=[: "),
     (Changes(values=("seed=1\nrepeats: 3",)), "--set seed=1"),
     (Changes(methods=("wirtinker",)), "--methods wirtinker: no such method in the config; did you mean 'wirtinger'?"),
     (Changes(targets=("image 9",)), "--targets image 9: no such target in the dataset; did you mean 'image "),
-    (Changes(targets=("",)), "--targets : no such target in the dataset"),
 ]
 
 

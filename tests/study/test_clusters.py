@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import run as running
 from holobench_eval.study import store
-from holobench_eval.study.executors import Serial, clusters, executor
+from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
 from tests.study.test_executors import compute, untimed
 from tests.support.fake_study import fake_work, write_config
@@ -42,42 +43,25 @@ for job in sys.argv[1:]:
 """
 
 
-@pytest.fixture
-def importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Worker processes find the fake study."""
-    here = str(Path(__file__).parents[2])
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_physics", "importable")
-def test_a_running_scheduler_gives_the_table_of_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from distributed import LocalCluster
-
-    config = write_config(tmp_path)
-    serial = compute(config, tmp_path / "serial", Serial())
-    monkeypatch.setattr(running, "step", fake_work)
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        chosen = Address(cluster.scheduler_address)
-        assert chosen.workers == 2
-        assert untimed(compute(config, tmp_path / "there", chosen)) == untimed(serial)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics", "importable")
-def test_workers_that_were_started_in_another_folder_write_where_the_run_reads(
+@pytest.mark.usefixtures("no_physics")
+def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_process_where_the_run_reads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from distributed import LocalCluster
 
     config = write_config(tmp_path)
+    config.write_text(f"{config.read_text()}isolation: none\n")
+    serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", fake_work)
+    here = str(Path(__file__).parents[2])  # where worker processes find the fake study
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         monkeypatch.chdir(tmp_path)
-        records = compute(Path(config.name), Path("out"), Address(cluster.scheduler_address))
-    assert {record["state"] for record in records} == {"done"}
+        found = compute(Path(config.name), Path("out"), Address(cluster.scheduler_address))
+    assert untimed(found) == untimed(serial)
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
@@ -99,34 +83,37 @@ def test_records_that_cannot_be_seen_end_the_run(tmp_path: Path, monkeypatch: py
         compute(write_config(tmp_path), tmp_path / "out", Elsewhere())
 
 
-def test_workers_with_several_threads_are_refused() -> None:
-    from distributed import LocalCluster
-
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
-        pytest.raises(UserError, match="start workers with --nthreads 1"),
-    ):
-        _ = Address(cluster.scheduler_address).workers
+SEEN = threading.Event()
 
 
-@pytest.mark.slow
+def until_seen(_: object) -> None:
+    SEEN.wait()
+
+
 @pytest.mark.parametrize("waiting", [False, True], ids=["with a job", "before its first job"])
 def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest.MonkeyPatch, waiting: bool) -> None:
+    import dask
     from distributed import LocalCluster
 
-    monkeypatch.setattr(clusters, "ANSWER", 2.0)
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    monkeypatch.setattr(clusters, "ANSWER", 0.5)
+    SEEN.clear()
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+    ):
 
-        def jobs() -> Iterator[float]:
+        def jobs() -> Iterator[int]:
+            close = partial(cluster.sync, cluster.scheduler.close)
             if waiting:
-                cluster.close()
+                close()
                 time.sleep(0.5)  # until the client has seen it
             else:
-                threading.Timer(1.0, cluster.close).start()
-            yield 30.0
+                threading.Timer(0.3, close).start()
+            yield 1
 
         with pytest.raises(UserError, match="the Dask scheduler went away; what is finished is kept"):
-            list(Address(cluster.scheduler_address).map(time.sleep, jobs()))
+            list(Address(cluster.scheduler_address).map(until_seen, jobs()))
+        SEEN.set()
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,26 +145,31 @@ def one_gpu_of_two() -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one(one_gpu_of_two: str) -> None:
-    chosen = Address(one_gpu_of_two, on_gpu=True)
-    assert chosen.workers == 1
-    assert [found for _, found in chosen.map(resources, range(6))] == [{"GPU": 1}] * 6
+@pytest.mark.parametrize(("on_gpu", "workers", "declared"), [(True, 1, {1}), (False, 2, {0, 1})])
+def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one_and_on_the_cpu_to_any(
+    one_gpu_of_two: str, on_gpu: bool, workers: int, declared: set[int]
+) -> None:
+    chosen = Address(one_gpu_of_two, on_gpu)
+    assert chosen.workers == workers
+    assert {found.get("GPU", 0) for _, found in chosen.map(resources, range(6))} == declared  # type: ignore[union-attr]
 
 
-def test_on_the_cpu_workers_that_declare_a_gpu_are_workers_like_others(one_gpu_of_two: str) -> None:
-    chosen = Address(one_gpu_of_two)
-    assert chosen.workers == 2
-    assert {len(found) for _, found in chosen.map(resources, range(6)) if isinstance(found, dict)} == {0, 1}
-
-
-def test_a_scheduler_without_a_gpu_says_how_to_start_a_worker_with_one() -> None:
+@pytest.mark.parametrize(
+    ("threads", "on_gpu", "message"),
+    [
+        (2, False, "has several threads; start workers with --nthreads 1"),
+        (1, True, 'declares a GPU; start one with: dask worker {address} --nthreads 1 --resources "GPU=1"'),
+    ],
+)
+def test_a_scheduler_without_workers_that_can_be_used_says_how_to_start_one(
+    threads: int, on_gpu: bool, message: str
+) -> None:
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=threads, processes=False, dashboard_address=None) as cluster:
         address = cluster.scheduler_address
-        with pytest.raises(UserError, match="declares a GPU; start one with: ") as caught:
-            _ = Address(address, on_gpu=True).workers
-    assert f'dask worker {address} --nthreads 1 --resources "GPU=1"' in str(caught.value)
+        with pytest.raises(UserError, match=message.format(address=address)):
+            _ = Address(address, on_gpu).workers
 
 
 @pytest.fixture
@@ -199,41 +191,16 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_physics", "importable")
-def test_a_slurm_queue_gives_the_table_of_one_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, queue: Path
-) -> None:
-    config = write_config(tmp_path)
-    serial = compute(config, tmp_path / "serial", Serial())
-    monkeypatch.setattr(running, "step", fake_work)
-    assert untimed(compute(config, tmp_path / "queued", Slurm(2))) == untimed(serial)
-    script = queue.read_text()
-    assert script.count("#SBATCH -J") == 2
-    assert "export OMP_NUM_THREADS=1" in script
-    assert "--resources" not in script
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("importable")
-def test_jobs_of_a_slurm_queue_on_gpus_run_on_workers_that_declare_one_beside_the_sites_own_arguments(
-    queue: Path,
+@pytest.mark.parametrize("on_gpu", [False, True])
+def test_jobs_of_a_slurm_queue_run_on_workers_of_one_thread_that_declare_a_gpu_beside_the_sites_own_arguments(
+    queue: Path, on_gpu: bool
 ) -> None:
     import dask
 
     with dask.config.set({"jobqueue.slurm.worker-extra-args": ["--lifetime", "1h"]}):
-        assert [found for _, found in Slurm(1, on_gpu=True).map(resources, range(2))] == [{"GPU": 1}] * 2
-    assert "--lifetime 1h --resources GPU=1" in queue.read_text()
-
-
-@pytest.mark.parametrize(
-    ("name", "workers", "address", "message"),
-    [
-        ("address", None, None, "belong together"),
-        ("local", None, "tcp://a:1", "belong together"),
-        ("address", 4, "tcp://a:1", "has its own"),
-        ("slurm", None, None, "needs --workers"),
-    ],
-)
-def test_what_a_cluster_needs_is_asked_for(name: str, workers: int | None, address: str | None, message: str) -> None:
-    with pytest.raises(UserError, match=message):
-        executor(name, workers, address=address)
+        assert dict(Slurm(1 + on_gpu, on_gpu).map(abs, range(-3, 0))) == {-3: 3, -2: 2, -1: 1}  # on a GPU if asked for
+    script = queue.read_text()
+    assert script.count("#SBATCH -J") == 1 + on_gpu
+    assert "export OMP_NUM_THREADS=1" in script
+    assert ("--lifetime 1h --resources GPU=1" if on_gpu else "--lifetime 1h") in script
+    assert ("--resources" in script) == on_gpu

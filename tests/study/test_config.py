@@ -7,7 +7,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.changes import Changes
 from holobench_eval.study.config import load_study
-from tests.study.studies import assert_refused
+from tests.study.studies import assert_refused, exchanged
 
 DATASETS = """
 from dataclasses import dataclass
@@ -58,20 +58,16 @@ def write(folder: Path, text: str) -> Path:
 def test_a_complete_config_becomes_a_study(tmp_path: Path) -> None:
     study = load_study(write(tmp_path, FULL))
     assert (study.title, study.seed, study.repeats, study.baseline) == ("A study", 7, 2, "GS")
-    assert study.display.panel == (128, 256)
-    assert study.display.exposure == "matched"
-    assert study.labels == ("wirtinger", "GS")
-    assert study.targets.params == {"count": 3}
-    assert study.save.captures
-    assert not study.save.phases
-    assert study.name == "study"
-    assert study.text == FULL
+    assert (study.display.panel, study.display.exposure) == ((128, 256), "matched")
+    assert (study.labels, study.targets.params) == (("wirtinger", "GS"), {"count": 3})
+    assert (study.save.captures, study.save.phases) == (True, False)
+    assert (study.name, study.text) == ("study", FULL)
 
 
 def test_a_grid_is_a_row_for_each_combination(tmp_path: Path) -> None:
     grid = "{name: wirtinger, params: {loss: huber}, grid: {iterations: [10, 50], step: [0.5, 1e-3]}}"
-    text = FULL.replace("- wirtinger", f"- {grid}").replace(
-        "baseline: GS", "baseline: wirtinger, iterations 50, step 0.5"
+    text = exchanged(
+        FULL, ("- wirtinger", f"- {grid}"), ("baseline: GS", "baseline: wirtinger, iterations 50, step 0.5")
     )
     study = load_study(write(tmp_path, text))
     expected = [(10, 0.5), (10, 0.001), (50, 0.5), (50, 0.001)]
@@ -86,17 +82,13 @@ def test_a_grid_is_a_row_for_each_combination(tmp_path: Path) -> None:
 def test_defaults_are_filled_in(tmp_path: Path) -> None:
     text = "title: t\ndisplay: {profiles: [ideal]}\ntargets: {dataset: 'sets.py:Images'}\nmethods: [wirtinger]\n"
     study = load_study(write(tmp_path, text))
-    assert study.baseline == "wirtinger"
-    assert study.methods[0].profiles == ("ideal",)
-    assert study.methods[0].params["iterations"] == 200
-    assert study.display.panel is None
-    assert study.reported is None
+    assert (study.baseline, study.display.panel, study.reported) == ("wirtinger", None, None)
+    assert (study.methods[0].profiles, study.methods[0].params["iterations"]) == (("ideal",), 200)
 
 
 CHANGES = [
     ("seed: 7", "sede: 7", "2:1: unknown key 'sede' in the document; did you mean 'seed'?"),
     ("seed: 7", "seed: -1", "2:7: seed should be greater than or equal to 0, got -1"),
-    ("seed: 7", "seed: 1.5", "2:7: seed should be a whole number"),
     ("seed: 7", "seed: .nan", "2:7: '.nan' is not a finite number"),
     ("seed: 7", "seed: yes", '2:7: seed should be a whole number, got "yes"'),
     ("seed: 7", "file: x", "2:1: unknown key 'file'"),
@@ -105,11 +97,8 @@ CHANGES = [
     ("profiles: [ideal]\n", "profiles: [idel]\n", "4:14: unknown profile 'idel'; did you mean 'ideal'?"),
     ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
     ("profiles: [ideal]\n", "profiles: [absent.yaml]\n", "4:14: profile 'absent.yaml': no such file"),
-    ("profiles: [ideal]\n", "profiles: ideal\n", "4:13: display.profiles should be a list"),
     ("panel: [128, 256]", "panel: [32, 256]", "5:11: display.panel[0] should be greater than or equal to 64, got 32"),
-    ("panel: [128, 256]", "panel: [128, 9000]", "5:16: display.panel[1] should be less than or equal to 8192"),
     ("panel: [128, 256]", "panel: [128]", "5:10: display.panel has too few values"),
-    ("panel: [128, 256]", "panel: [128, 1, 1]", "5:10: display.panel tuple should have at most 2 items"),
     ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels of this panel; "),
     ("  panel: [128, 256]", "\tpanel: [128, 256]", "5:1: a tab, which YAML does not take here; use spaces"),
     ("- wirtinger", "- {name: sgd, params: {privileged: true}}", "9:26: method 'sgd': 'privileged' is no parameter; "),
@@ -122,16 +111,11 @@ CHANGES = [
     ("count: 3", "count: 0", "7:20: dataset 'sets.py:Images' has no images"),
     ("- wirtinger", "- wirtinker", "9:5: unknown method 'wirtinker'; did you mean 'wirtinger'?"),
     ("- wirtinger", "- 3", "9:5: methods[0] should be a mapping"),
-    ("- wirtinger", "- {label: x}", "9:5: missing key 'name' in methods[0]"),
     ("iterations: 12", "itterations: 12", "10:52: method 'gerchberg_saxton' has no parameter 'itterations'"),
     ("iterations: 12", "iterations: 0", "10:64: method 'gerchberg_saxton': parameter 'iterations': input should be"),
-    ("iterations: 12", "iterations: many", "10:64: method 'gerchberg_saxton': parameter 'iterations'"),
-    ("params: {iterations: 12}", "parms: {}", "10:43: unknown key 'parms' in methods[1]; did you mean 'params'?"),
     ("profiles: [ideal]}", "profiles: [idael]}", "10:80: 'idael' is not in display.profiles; did you mean 'ideal'?"),
-    ("params: {iterations: 12}", "grid: {iteratons: [1]}", "10:50: method 'gerchberg_saxton' has no parameter"),
     ("params: {iterations: 12}", "grid: {iterations: [1, 0]}", "10:62: method 'gerchberg_saxton': parameter"),
     ("params: {iterations: 12}", "grid: {iterations: []}", "10:62: methods[1].grid.iterations"),
-    ("params: {iterations: 12}", "grid: {iterations: 3}", "10:62: methods[1].grid.iterations should be a list"),
     ("params: {iterations: 12}", "grid: {iterations: [3, 3]}", "10:49: two rows are named 'GS, iterations 3'; list"),
     ('label: "GS"', "grid: {iterations: [3]}", "10:37: 'iterations' stands in params, too; keep one of the two"),
     ('label: "GS"', 'label: "Wirtinger "', "10:37: methods[1] and methods[0] share the label 'Wirtinger ', but"),
@@ -139,7 +123,6 @@ CHANGES = [
     ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),
     ('label: "GS"', 'label: "a\\nb"', "10:37: label 'a\\nb' should be printable"),
     ("repeats: 2", "timing: serial", "11:9: timing should be 'shared' or 'alone', got \"serial\""),
-    ("repeats: 2", "repeats: 0", "11:10: repeats should be greater than or equal to 1"),
     ("baseline: GS", "baseline: gs", "12:11: no method has the label 'gs'; "),
     ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),
     ("captures: true", "captures: 1", "14:18: save.captures should be a valid boolean"),
@@ -157,7 +140,10 @@ CHANGES = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "message"), CHANGES)
+SECOND = ("baseline: GS", "second_baseline: gs", "12:18: no method has the label 'gs'")
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [*CHANGES, SECOND])
 def test_a_mistake_is_one_line_at_its_place(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in FULL
     assert_refused(write(tmp_path, FULL.replace(old, new, 1)), message)
@@ -165,8 +151,7 @@ def test_a_mistake_is_one_line_at_its_place(tmp_path: Path, old: str, new: str, 
 
 def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path: Path) -> None:
     text = FULL.replace("- wirtinger", "- {name: gerchberg_saxton, params: {iterations: 12}}")
-    with pytest.raises(UserError, match=r"study\.yaml:10:5: methods\[1\] has the method, parameters and display"):
-        load_study(write(tmp_path, text))
+    assert_refused(write(tmp_path, text), "10:5: methods[1] has the method, parameters and display")
 
 
 def test_a_missing_config_is_named(tmp_path: Path) -> None:
@@ -176,13 +161,9 @@ def test_a_missing_config_is_named(tmp_path: Path) -> None:
 
 def test_every_config_of_the_repository_asks_its_question_and_says_what_would_change_the_answer() -> None:
     for path in sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")):
-        study = (
-            load_study(path) if path.stem not in ("hil-paper", "peers", "photographs") else None
-        )  # these need what is not here
-        text = path.read_text()
-        assert study is None or "?" in study.question, path
-        assert "\nquestion: " in text, path
-        assert "\nwould_change: " in text, path
+        if path.stem not in ("hil-paper", "peers", "photographs"):  # these need what is not here
+            assert "?" in load_study(path).question, path
+        assert all(f"\n{key}: " in path.read_text() for key in ("question", "would_change")), path
 
 
 @pytest.mark.parametrize(("panel", "enough"), [("[64, 64]", (118, 118)), ("[64, 256]", (118, 256))])
@@ -202,7 +183,4 @@ def test_a_parameter_of_ones_own_method_may_not_say_what_only_its_class_declares
         "    def solve(self, target, bench):\n        return target\n"
     )
     text = FULL.replace("- wirtinger", '- {name: "mine.py:Mine", params: {privileged: true}}') + "isolation: none\n"
-    with pytest.raises(
-        UserError, match=r"study\.yaml:9:37: method 'mine\.py:Mine': 'privileged' is no parameter; only"
-    ):
-        load_study(write(tmp_path, text))
+    assert_refused(write(tmp_path, text), "9:37: method 'mine.py:Mine': 'privileged' is no parameter; only")

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,6 @@ from holobench_eval.study import cost
 
 ROOT = Path(__file__).parents[2]
 LARGE = 48
-LINUX = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
 
 
 def touched(mib: int) -> float:
@@ -47,34 +46,21 @@ def peak_of_what_is_taken_again() -> cost.Cost:
     return taken
 
 
-def measured(taken: Callable[[], cost.Cost]) -> cost.Cost:
-    """What a function takes in a process of its own. In one where the program break could once not be raised, as other
-    tests may leave it, glibc no longer gives back what lies at the end of its memory."""
-    code = f"from {__name__} import {taken.__name__} as taken; print(repr(taken()))"
+PEAKS = (peak_of_what_is_let_go, peak_beside_what_is_held, peak_of_what_is_taken_again)
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
+def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_taken_again() -> None:
+    """In a process of its own: in one where the program break could once not be raised, as other tests may leave it,
+    glibc no longer gives back what lies at the end of its memory."""
+    code = f"import json; from {__name__} import PEAKS; print(json.dumps([vars(of()) for of in PEAKS]))"
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, text=True, capture_output=True, check=True)
-    return eval(run.stdout, {"Cost": cost.Cost})
-
-
-@LINUX
-def test_the_peak_counts_and_not_what_is_left_at_the_end() -> None:
-    taken = measured(peak_of_what_is_let_go)
-    assert taken.memory_mib is not None
-    assert LARGE - 2 < taken.memory_mib < LARGE + 16
-    assert taken.seconds > 0
-
-
-@LINUX
-def test_an_earlier_peak_is_forgotten_and_held_memory_is_not_counted() -> None:
-    taken = measured(peak_beside_what_is_held)
-    assert taken.memory_mib is not None
-    assert taken.memory_mib < LARGE / 2
-
-
-@LINUX
-def test_memory_that_was_let_go_before_counts_when_it_is_taken_again() -> None:
-    taken = measured(peak_of_what_is_taken_again)
-    assert taken.memory_mib is not None
-    assert taken.memory_mib > LARGE / 2
+    found = json.loads(run.stdout)
+    assert all(taken["seconds"] > 0 for taken in found)
+    let_go, beside_held, again = (taken["memory_mib"] for taken in found)
+    assert LARGE - 2 < let_go < LARGE + 16
+    assert beside_held < LARGE / 2
+    assert again > LARGE / 2
 
 
 def test_without_the_linux_files_time_is_measured_and_memory_is_not(

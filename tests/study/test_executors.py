@@ -4,9 +4,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from functools import partial
+from multiprocessing import forkserver
 from pathlib import Path
+from socket import AF_UNIX, socket
 from typing import Any
 
 import pytest
@@ -14,7 +18,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import executors
 from holobench_eval.study import run as running
-from holobench_eval.study.executors import Executor, Local, Serial, executor
+from holobench_eval.study.executors import Executor, Local, Serial, executor, processes
 from tests.study import test_run
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE
@@ -81,12 +85,10 @@ def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_p
     assert (tmp_path / "picture").read_text() == "drawn"
 
 
-def reciprocal(number: int) -> float:
-    return 1 / number
-
-
-def surroundings(_: int) -> tuple[str, str, str]:
+def surroundings(number: int) -> tuple[str, str, str]:
     time.sleep(0.2)  # so that the other worker takes the other job
+    if number == 2:
+        raise ValueError("no light")
     return os.environ["CUDA_VISIBLE_DEVICES"], os.environ["OMP_NUM_THREADS"], str(Path.cwd())
 
 
@@ -96,84 +98,89 @@ def endless(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_error_in_a_worker_is_the_result_of_its_job() -> None:
-    results = dict(Local(2).map(reciprocal, [2, 0, 4]))
-    assert (results[2], results[4]) == (0.5, 0.25)
-    assert isinstance(results[0], ZeroDivisionError)
-
-
-@pytest.mark.slow
-def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run(
+def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_an_error_is_the_result_of_its_job(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.chdir(tmp_path)
-    found = [surrounding for _, surrounding in Local(2, gpus=2).map(surroundings, range(2))]
-    assert sorted(found) == [("3", "1", str(tmp_path)), ("5", "1", str(tmp_path))]
+    found = dict(Local(2, gpus=2).map(surroundings, range(3)))
+    assert repr(found.pop(2)) == "ValueError('no light')"
+    assert sorted(found.values()) == [("3", "1", str(tmp_path)), ("5", "1", str(tmp_path))]  # type: ignore[type-var]
     assert os.environ["OMP_NUM_THREADS"] == "7"
+
+
+def run_of_two(folder: Path) -> None:
+    list(Local(2).map(endless, [folder] * 2))
+
+
+def wait_until(reached: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not reached():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
 def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> None:
-    code = "import sys, pathlib; from tests.study.test_executors import Local, endless; "
-    code += "list(Local(2).map(endless, [pathlib.Path(sys.argv[1])] * 2))"
-    run = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path)], cwd=Path(__file__).parents[2], stderr=subprocess.DEVNULL
-    )
-    while len(list(tmp_path.iterdir())) < 2:
-        assert run.poll() is None
-        time.sleep(0.05)
-    run.send_signal(ending)
-    run.wait(timeout=PATIENCE)
-    deadline = time.monotonic() + PATIENCE
-    for worker in tmp_path.iterdir():
-        while Path("/proc", worker.name).exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+    def end(run: int) -> None:
+        wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
+        os.kill(run, ending)
+
+    if ending == signal.SIGKILL:
+        run = processes.start(run_of_two, tmp_path)
+        assert run.pid is not None
+        end(run.pid)
+        run.join(PATIENCE)
+    else:
+        signal.signal(ending, signal.default_int_handler)  # which dask-jobqueue has replaced where it was imported
+        interrupting = threading.Thread(target=end, args=(os.getpid(),))
+        interrupting.start()
+        with pytest.raises(KeyboardInterrupt):
+            run_of_two(tmp_path)
+        interrupting.join()
+    wait_until(lambda: not any(Path("/proc", worker.name).exists() for worker in tmp_path.iterdir()))
 
 
 @pytest.mark.slow
-def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet() -> None:
+def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text("import time\nopen('importing', 'w').close()\ntime.sleep(1)")
     code = """if True:
         import time
-        from holobench_eval.study.executors.processes import prepare
-        prepare()
-        print("begun", flush=True)
+        from holobench_eval.study.executors import processes
+        processes.PRELOADED = ["slow"]
+        processes.prepare()
         try:
             time.sleep(1000)
         except KeyboardInterrupt:
             print("seen")
     """
     run = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
     )
-    assert run.stdout is not None
-    assert run.stdout.readline() == "begun\n"
-    time.sleep(0.3)  # Python has started there, and the libraries take longer
+    wait_until((tmp_path / "importing").exists)
     os.killpg(run.pid, signal.SIGINT)
     assert run.communicate(timeout=PATIENCE) == ("seen\n", "")
 
 
 @pytest.mark.slow
 def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others() -> None:
-    code = """if True:
-        import time
-        from multiprocessing import forkserver
-        from socket import AF_UNIX, socket
-        from holobench_eval.study.executors.processes import prepare, start
-        prepare()
-        server = forkserver._forkserver._forkserver_pid
-        for _ in range(3):
-            with socket(AF_UNIX) as client:
-                client.connect(forkserver._forkserver._forkserver_address)
-            other = start(time.sleep, 0)
-            other.join(600)
-            print(other.exitcode, forkserver._forkserver._forkserver_pid == server)
-    """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert (done.stdout, done.stderr) == ("0 True\n" * 3, "")
+    processes.prepare()
+    server: Any = forkserver._forkserver  # type: ignore[attr-defined]
+    before = server._forkserver_pid
+    for _ in range(3):
+        with socket(AF_UNIX) as client:
+            client.connect(server._forkserver_address)
+        other = processes.start(time.sleep, 0)
+        other.join(PATIENCE)
+        assert (other.exitcode, server._forkserver_pid) == (0, before)
 
 
 @pytest.mark.parametrize(
@@ -213,13 +220,19 @@ def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "workers", "message"),
+    ("name", "workers", "address", "message"),
     [
-        ("loca", None, "did you mean 'local'"),
-        ("local", 0, "at least 1"),
-        ("serial", 2, "--executor local"),
+        ("loca", None, None, "did you mean 'local'"),
+        ("local", 0, None, "at least 1"),
+        ("serial", 2, None, "--executor local"),
+        ("address", None, None, "belong together"),
+        ("local", None, "tcp://a:1", "belong together"),
+        ("address", 4, "tcp://a:1", "has its own"),
+        ("slurm", None, None, "needs --workers"),
     ],
 )
-def test_an_executor_that_cannot_be_is_refused(name: str, workers: int | None, message: str) -> None:
+def test_an_executor_that_cannot_be_is_refused(
+    name: str, workers: int | None, address: str | None, message: str
+) -> None:
     with pytest.raises(UserError, match=message):
-        executor(name, workers)
+        executor(name, workers, address=address)

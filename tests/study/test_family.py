@@ -39,6 +39,7 @@ def small() -> Family:
     family = load_family("leto-2020")
     return replace(
         family,
+        geometries=family.geometries[:1],
         panel=(128, 128),
         targets=Targets("dead_leaves", {"count": 1, "seed": 1, "colours": "natural"}),
         tolerance={"psnr": 4.0, "ssim": 0.5},
@@ -101,7 +102,10 @@ def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
     small: Family, rows: tuple[Path, list[Row]], tmp_path: Path
 ) -> None:
     folder, found = rows
+    with pytest.raises(UserError, match="give more --draws"):
+        posterior.members(replace(small, members=40), "leto-2020", found, folder)
     kept = posterior.members(small, "leto-2020", found, folder)
+    assert missed(small, {**found[0], "wirtinger.psnr_linear": float("nan")}, "linear") == float("inf")
     assert [member.draw.is_outside for member in kept].count(True) == 1
     for member in kept:
         assert missed(small, member.scores, "linear") <= 1
@@ -112,16 +116,6 @@ def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
     report = write_family(tmp_path, small, found, kept, posterior.middle(small, found, kept)).read_text()
     assert "leto-2020-02" in report
     assert (tmp_path / "corner.png").stat().st_size > 10_000
-
-
-def test_too_few_draws_that_fit_are_said(small: Family, rows: tuple[Path, list[Row]]) -> None:
-    with pytest.raises(UserError, match="give more --draws"):
-        posterior.members(replace(small, members=40), "leto-2020", rows[1], rows[0])
-
-
-def test_a_display_that_could_not_be_registered_fits_nothing(small: Family, rows: tuple[Path, list[Row]]) -> None:
-    row = {**rows[1][0], "wirtinger.psnr_linear": float("nan")}
-    assert missed(small, row, "linear") == float("inf")
 
 
 @pytest.mark.parametrize("line", ["1,2\n", "3,a\n", "1," * 60 + "\n"])

@@ -68,20 +68,6 @@ def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkey
     assert [after[name] == before[name] for name in names] == [True, False]
 
 
-def test_a_file_that_changed_after_planning_is_not_taken_for_the_planned_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    path = config(tmp_path, "files", '{name: phases, params: {file: "all.npy"}}')
-    np.save(tmp_path / "all.npy", np.zeros((3, 128, 128)))
-    grid = planned(path)
-    np.save(tmp_path / "all.npy", np.ones((3, 128, 128)))
-    found = compute(path, tmp_path / "out", grid=grid).records
-    reasons = {record["reason"] for record in found if record["label"] == "phases"}
-    assert len(reasons) == 1
-    assert "has changed since the study was planned" in reasons.pop()
-
-
 @pytest.fixture
 def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -111,11 +97,10 @@ def test_two_targets_with_the_same_file_are_refused_when_the_study_is_planned(
     assert len(ids(planned(named(pictures, "{stem}.npy")))) == 2
 
 
-def test_one_file_for_all_targets_is_no_mistake(pictures: Path) -> None:
+def test_one_file_for_all_targets_is_no_mistake_and_where_it_is_not_there_the_target_with_an_altered_name_is_named(
+    pictures: Path,
+) -> None:
     assert len(set(ids(planned(named(pictures, "a.npy"))).values())) == 3
-
-
-def test_where_no_file_is_there_the_target_with_an_altered_name_is_named(pictures: Path) -> None:
     for name in ("a.jpg", "a.png"):
         (pictures / name).unlink()
     message = r"is there, such as p/red_cup\.npy for the target 'red cup\.png', from the working directory"
@@ -123,29 +108,31 @@ def test_where_no_file_is_there_the_target_with_an_altered_name_is_named(picture
         planned(named(pictures, "p/{stem}.npy"))
 
 
-METHOD = '''
+METHOD = """
 import numpy as np
 import torch
 
 
 def mine(target, bench):
-    """A phase from a file of its own."""
     return torch.from_numpy(np.load("mine.npy")).float().expand(len(target), -1, -1, -1)
 
 
 mine.files = lambda target_name: ["mine.npy"]
-'''
+"""
 
 
-def test_a_method_of_a_file_says_which_files_it_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_method_of_a_file_says_which_files_it_reads_and_one_that_changed_after_planning_is_not_taken_for_the_planned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "method.py").write_text(METHOD)
     path = config(tmp_path, "files", '"method.py:mine"')
-    for value in (0, 1):
-        np.save(tmp_path / "mine.npy", np.full((3, 128, 128), value))
-        grid = planned(path)
-        found = {cell.files["mine.npy"] for label, cell in grid.labelled() if label == "mine"}
-        assert len(found) == 1
-        assert "absent" not in found
-    records = compute(path, tmp_path / "out", grid=grid).records
-    assert {record["state"] for record in records} == {"done"}
+    np.save(tmp_path / "mine.npy", np.zeros((3, 128, 128)))
+    grid = planned(path)
+    (digest,) = {cell.files["mine.npy"] for label, cell in grid.labelled() if label == "mine"}
+    assert digest != "absent"
+    assert {record["state"] for record in compute(path, tmp_path / "out", grid=grid).records} == {"done"}
+    np.save(tmp_path / "mine.npy", np.ones((3, 128, 128)))
+    found = compute(path, tmp_path / "other", grid=grid).records
+    (reason,) = {record["reason"] for record in found if record["label"] == "mine"}
+    assert "has changed since the study was planned" in reason

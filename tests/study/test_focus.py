@@ -26,6 +26,7 @@ methods:
   - {name: multi_plane, params: {iterations: 20}}
   - {name: "middle.py:Middle", params: {iterations: 20}}
 headline: psnr_linear_infocus
+protocol: {metrics: [psnr, ssim]}
 """
 
 MIDDLE = '''
@@ -113,7 +114,8 @@ def records(study: Path) -> dict[tuple[str, str], dict[str, Any]]:
 def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(
     records: dict[tuple[str, str], dict[str, Any]], tmp_path: Path
 ) -> None:
-    config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"))
+    alone = CONFIG[CONFIG.index("  - {name: multi") : CONFIG.index("headline")]
+    config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"), (alone, ""))
     pictures = {(r["label"], r["cell"]["target"]): r["scores"] for r in compute(config).records}
     place = ("wirtinger", "shapes@0mm")
     plain, found = pictures[place], records[place]["scores"]
@@ -138,14 +140,11 @@ def test_a_lens_keeps_more_than_the_camera_loses_without_one(
         assert moved["psnr_linear"] > stayed["psnr_linear"] + 3
 
 
-def test_planes_of_a_scene_share_the_time_of_their_hologram(
+def test_planes_of_a_scene_share_the_time_of_their_hologram_and_the_floor_is_scored_in_focus_too(
     records: dict[tuple[str, str], dict[str, Any]],
 ) -> None:
     targets = ("shapes@-1.5mm", "shapes@0mm", "shapes@1.5mm")
     assert len({records["multi_plane", target]["seconds"] for target in targets}) == 1
-
-
-def test_the_floor_is_scored_in_focus_too(records: dict[tuple[str, str], dict[str, Any]]) -> None:
     assert records["floor_constant", "shapes@0mm"]["scores"]["psnr_linear_infocus"] < 25
     assert records["floor_constant", "shapes@0mm"]["cell"]["condition"] == REFERENCE
 
@@ -156,29 +155,20 @@ def pictures() -> tuple[torch.Tensor, torch.Tensor]:
     return 3 * (wanted + 0.1 * torch.rand(3, 40, 48, generator=draw)), wanted
 
 
-def test_in_focus_everywhere_is_the_score_of_the_picture() -> None:
+def test_only_errors_in_focus_count_and_those_of_the_whole_picture_where_all_is() -> None:
     image, wanted = pictures()
     plain = score(image, wanted, metrics=["psnr", "ssim"])
     found = in_focus(image, wanted, torch.ones(40, 48, dtype=torch.bool))
-    assert found["psnr_linear_infocus"] == pytest.approx(plain["psnr_linear"], abs=1e-9)
-    assert found["ssim_linear_infocus"] == pytest.approx(plain["ssim_linear"], abs=1e-9)
-
-
-def test_errors_out_of_focus_do_not_count() -> None:
-    _, wanted = pictures()
+    assert found == pytest.approx({f"{name}_infocus": plain[name] for name in ("psnr_linear", "ssim_linear")}, abs=1e-9)
     mask = torch.zeros(40, 48, dtype=torch.bool)
+    with pytest.raises(CellError, match="nothing of this picture is in focus"):
+        in_focus(image, wanted, mask)
     mask[:, :20] = True
     image = wanted.clone()
     image[:, :, 30:] = wanted[:, :, 30:].flip(-1)  # keeps the brightness nearly as it is
-    found = in_focus(image, wanted, mask)
-    assert found["psnr_linear_infocus"] > in_focus(image, wanted, ~mask)["psnr_linear_infocus"] + 3
-    assert found["ssim_linear_infocus"] > in_focus(image, wanted, ~mask)["ssim_linear_infocus"] + 0.1
-
-
-def test_a_picture_with_nothing_in_focus_is_no_score() -> None:
-    image, wanted = pictures()
-    with pytest.raises(CellError, match="nothing of this picture is in focus"):
-        in_focus(image, wanted, torch.zeros(40, 48, dtype=torch.bool))
+    good, bad = (in_focus(image, wanted, each) for each in (mask, ~mask))
+    assert good["psnr_linear_infocus"] > bad["psnr_linear_infocus"] + 3
+    assert good["ssim_linear_infocus"] > bad["ssim_linear_infocus"] + 0.1
 
 
 REFUSED = [

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.core.errors import CellError
-from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from holobench_eval.study.versions import gate
 from tests.study.test_run import compute
-from tests.support.trained_study import write
+from tests.support.trained_study import needs, write
+
+pytestmark = pytest.mark.usefixtures("no_physics")
 
 METHODS = 'methods: ["trained.py:Gain"]'
 OTHER = (METHODS, METHODS.replace("trained", "other"))  # in a file beside that of the images
@@ -60,16 +59,22 @@ def test_code_that_was_edited_does_nothing(tmp_path: Path, changes: tuple[tuple[
     assert "the code of other.py:Even has changed since the study was planned" in why
 
 
-def test_a_file_that_is_another_one_is_refused() -> None:
-    gate(Wirtinger(), "wirtinger", "Wirtinger 1", {"a": "1"}, {"a": "1"})
-    with pytest.raises(CellError, match="a file that wirtinger reads has changed since the study was planned"):
-        gate(Wirtinger(), "wirtinger", "Wirtinger 1", {"a": "1"}, {"a": "2"})
+@pytest.mark.parametrize("name", ["Even", "Gain"])
+def test_the_code_of_images_that_was_edited_is_refused(tmp_path: Path, name: str) -> None:
+    (why,) = reasons(
+        write(tmp_path, (METHODS, f'methods: ["other.py:{name}"]')), lambda text: f"{text}\n", "trained.py"
+    )
+    assert "the code of dataset 'trained.py:" in why
 
 
-def test_a_training_of_before_an_edit_is_not_used_after_it(tmp_path: Path) -> None:
-    config = write(tmp_path)
-    (before,) = plan(load_study(config)).preparations().values()
-    Artifacts(tmp_path / "artifacts").write(before, {}, {"captures": 0, "seconds": 0.0})
-    (tmp_path / "trained.py").write_text(edited((tmp_path / "trained.py").read_text()))
-    (after,) = plan(load_study(config)).preparations().values()
-    assert not Artifacts(tmp_path / "artifacts").has(after)
+@pytest.mark.parametrize(("file", "outdated"), [("other.py", "other code"), ("trained.py", "other code of its images")])
+def test_a_training_of_before_an_edit_is_not_used_after_it(tmp_path: Path, file: str, outdated: str) -> None:
+    config, artifacts, path = write(tmp_path, OTHER), Artifacts(tmp_path / "artifacts"), tmp_path / file
+    (tmp_path / "other.py").write_text((tmp_path / "trained.py").read_text())
+    (before,) = needs(config)
+    artifacts.write(before, {}, {"captures": 0, "seconds": 0.0})
+    path.write_text(edited(path.read_text()))
+    (after,) = needs(config)
+    assert before.id != after.id
+    assert not artifacts.has(after)
+    assert f"was learned with {outdated}" in artifacts.outdated(after)

@@ -10,7 +10,6 @@ import pytest
 import torch
 
 from holobench_eval.methods.double_phase import DoublePhase
-from holobench_eval.study.artifacts import STATE, Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.cost import Cost
 from holobench_eval.study.executors import Serial
@@ -72,28 +71,26 @@ def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_p
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_study_beside_uses_the_phases_that_another_has_solved(tmp_path: Path, found: list[str]) -> None:
+def test_a_study_beside_uses_the_phases_that_another_has_solved_and_solves_the_repeats_that_are_new(
+    tmp_path: Path, found: list[str]
+) -> None:
     results = tmp_path / RESULTS
     first = compute(write_study(tmp_path), results / "a")
-    second = compute(write_study(tmp_path, 3), results / "b")
+    second = compute(write_study(tmp_path, 3), results / "b", executor=Serial())
     assert len(found) == 2
     assert (first.solved, second.solved) == (2, 0)
     assert [record["reused"] for record in second.records if record["label"] == "double_phase"] == [True] * 6
-    assert scores(compute(write_study(tmp_path, 3), tmp_path / "alone")) == scores(second)
-    assert len(found) == 4  # a folder that lies elsewhere shares nothing
+    assert compute(write_study(tmp_path, 1, ("seed: 3", "seed: 3\nrepeats: 2")), results / "c").solved == 2
+    assert len(found) == 4
+    alone = compute(write_study(tmp_path, 3), tmp_path / "alone", executor=Serial())
+    assert untimed(alone.records) == untimed(second.records)
+    assert len(found) == 6  # a folder that lies elsewhere shares nothing
 
 
 def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_repeat_more_is_solved_and_the_first_is_not_again(tmp_path: Path, found: list[str]) -> None:
-    compute(write_study(tmp_path), tmp_path / RESULTS / "a")
-    assert compute(write_study(tmp_path, 1, ("seed: 3", "seed: 3\nrepeats: 2")), tmp_path / RESULTS / "b").solved == 2
-    assert len(found) == 4
 
 
 @pytest.mark.usefixtures("no_physics")
@@ -135,23 +132,14 @@ def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
         assert read is not None
         assert torch.equal(read.phase, SOLUTION.phase)
         assert replace(read, phase=SOLUTION.phase) == replace(SOLUTION, reused=True)
+    assert phases.read("ab") is None
+    assert phases.read("ab", "abd") is None  # of another training
     assert phases.read("cd", None) is None
     phases.remove(["ab", "cd"])
     assert phases.read("ab", None) is None
-
-
-def test_a_solution_by_another_training_is_none(tmp_path: Path) -> None:
-    phases = Phases(tmp_path)
-    phases.keep("ab", SOLUTION)
-    assert phases.read("ab") is None
-    assert phases.read("ab", "abd") is None
-
-
-def test_a_solution_of_another_name_is_none(tmp_path: Path) -> None:
-    phases = Phases(tmp_path)
     phases.keep("ab", SOLUTION)
     phases.path("ab").rename(phases.path("cd"))
-    assert phases.read("cd", None) is None
+    assert phases.read("cd", None) is None  # of another name
 
 
 def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
@@ -186,40 +174,16 @@ def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_run_that_shar
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_training_again_forgets_the_phases_of_what_was_trained_and_no_others(tmp_path: Path) -> None:
+def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and_no_others(tmp_path: Path) -> None:
     config = trained_study.write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
-    trained_study.compute(config)
+    first = trained_study.compute(config)
     phases = phases_of(tmp_path / "out")
     even, gain = (phases.path(cell.phase_id) for cell in plan(load_study(config)).cells if cell.code)
     before = [file.stat().st_mtime_ns for file in (even, gain)]
-    assert trained_study.compute(config, retrain=True).solved == 1
+    again = trained_study.compute(config, retrain=True)
+    assert (first.computed, again.computed, again.solved) == (7, 1, 1)
+    assert trained_study.rounds(tmp_path) == [0, 1, 0, 1]
+    assert again.records[-1]["scores"] == first.records[-1]["scores"]
     after = [file.stat().st_mtime_ns for file in (even, gain)]
     assert after[0] == before[0]
     assert after[1] > before[1]
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_phase_of_another_training_is_not_used(tmp_path: Path) -> None:
-    config = trained_study.write(tmp_path)
-    results = tmp_path / RESULTS
-    first = compute(config, results / "a")
-    (needed,) = trained_study.needs(config)
-    artifacts = Artifacts(results / "artifacts")  # where ``compute`` keeps what was learned
-    state = dict(artifacts.load(needed).state)
-    known = artifacts.load(needed).provenance.items()
-    facts = {key: value for key, value in known if key not in ("sha256", "log_sha256")}
-    assert (artifacts.folder_of(needed) / STATE).is_file()
-    artifacts.remove(needed)
-    artifacts.write(needed, {**state, "gain": 3 * state["gain"]}, facts)
-    second = compute(config, results / "b")
-    assert (first.solved, second.solved) == (1, 1)
-    assert scores(second)[-1] != scores(first)[-1]
-    assert second.records[-1]["learned"]["sha256"] != first.records[-1]["learned"]["sha256"]
-
-
-def test_no_records_of_a_serial_run_depend_on_what_was_solved_before(tmp_path: Path, no_physics: None) -> None:
-    results, config = tmp_path / RESULTS, write_study(tmp_path, 2)
-    whole = compute(config, results / "a", executor=Serial())
-    again = compute(config, results / "b", executor=Serial())
-    unused = [{**record, "reused": False} for record in untimed(again.records)]
-    assert unused == [{**record, "reused": False} for record in untimed(whole.records)]

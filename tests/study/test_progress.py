@@ -9,6 +9,7 @@ from rich.console import Console
 from holobench_eval.commands.plan import Row, preview, table
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
+from holobench_eval.study.definition import Study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.progress import Lines, duration, watching
 from holobench_eval.study.run import run
@@ -24,13 +25,18 @@ def failed(task: planning.Task) -> list[Record]:
     ]
 
 
-def test_plain_lines_come_at_most_every_few_seconds(tmp_path: Path) -> None:
-    tasks = planning.plan(load_study(write_config(tmp_path))).tasks
+@pytest.fixture
+def task(tmp_path: Path) -> planning.Task:
+    """The last of a study."""
+    return planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+
+
+def test_plain_lines_come_at_most_every_few_seconds(task: planning.Task) -> None:
     now = [0.0]
     lines: list[str] = []
     watch = Lines(lines.append, clock=lambda: now[0])
     watch.planned(100, 60, 42)
-    for task in tasks * 10:
+    for _ in range(60):
         watch.started(task)
         now[0] += 1.0
         watch.finished([])
@@ -38,25 +44,15 @@ def test_plain_lines_come_at_most_every_few_seconds(tmp_path: Path) -> None:
     assert len(lines) == 1 + 60 // 5 - 1
 
 
-def test_a_failure_is_told_at_once_and_counted(tmp_path: Path) -> None:
-    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
-    lines: list[str] = []
-    watch = Lines(lines.append)
-    watch.planned(1, 1, 0)
-    watch.finished(failed(task))
-    assert lines[-1] == "failed: Toy · ideal · gray 2: no [light]"
-    assert watch.failures == 1
-
-
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_console_shows_failures_whatever_it_is(tmp_path: Path, terminal: bool) -> None:
-    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task: planning.Task, terminal: bool) -> None:
     text = io.StringIO()
     with watching(Console(file=text, force_terminal=terminal, width=120)) as watch:
         watch.planned(2, 1, 0)
         watch.started(task)
         watch.finished(failed(task))
-    assert "gray 2: no [light]" in text.getvalue()
+        assert "failed: Toy · ideal · gray 2: no [light]" in text.getvalue()
+        assert watch.failures == 1
     assert ("1 failed" in text.getvalue()) == terminal
 
 
@@ -78,46 +74,47 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) ->
     assert all(row.seconds is not None and row.seconds > 0 for row in elsewhere[1:])
 
 
-def test_the_table_of_a_preview_shows_sums_and_brackets(tmp_path: Path) -> None:
-    study = load_study(write_config(tmp_path))
-    rows = [Row("a[b]", 1, 2, 30, None, 10, 0, 20, 1.5), Row("c", 1, 2, 4, 50, 0, 0, 4, None)]
+def printed(study: Study, rows: list[Row], width: int = 160) -> str:
+    """The table of a preview."""
     text = io.StringIO()
-    Console(file=text, width=160).print(table(study, rows))
-    assert all(word in text.getvalue() for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving"))
+    Console(file=text, width=width).print(table(study, rows))
+    return text.getvalue()
 
 
-def test_a_preview_of_which_nothing_was_timed_has_no_column_of_unknown_times(tmp_path: Path) -> None:
-    study, text = load_study(write_config(tmp_path)), io.StringIO()
-    Console(file=text, width=160).print(table(study, [Row("c", 1, 2, 4, 50, 0, 0, 4, None)]))
-    assert "solving" not in text.getvalue()
-    assert "not timed" not in text.getvalue()
+UNTIMED = Row("c", 1, 2, 4, 50, 0, 0, 4, None)
+
+
+def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_any_is_known(tmp_path: Path) -> None:
+    study = load_study(write_config(tmp_path))
+    text = printed(study, [Row("a[b]", 1, 2, 30, None, 10, 0, 20, 1.5), UNTIMED])
+    assert all(word in text for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving"))
+    assert not any(word in printed(study, [UNTIMED]) for word in ("solving", "not timed"))
+    text = printed(study, preview(study, planning.plan(study), Store(tmp_path / "out"), threads=1, workers=1))
+    assert all(words in text for words in ("floor images, no method", "all, 18 of them floors"))
 
 
 def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
-    study = load_study(write_config(tmp_path))
     rows = [
         Row("online_camera_network", 3, 28, 1234, 2800, 1000, 12, 1222, 12345.0),
         Row("x" * 60, 3, 28, 84, None, 0, 0, 84, None),
     ]
-    text = io.StringIO()
-    Console(file=text, width=80).print(table(study, rows))
-    lines = text.getvalue().splitlines()
+    lines = printed(load_study(write_config(tmp_path)), rows, width=80).splitlines()
     assert max(map(len, lines)) <= 80
-    assert "…" not in text.getvalue()
+    assert "…" not in "".join(lines)
     assert all(any(word in line.split() for line in lines) for word in ("displays", "captures", "1222", "2800", "1318"))
 
 
-def test_the_table_of_a_preview_says_how_many_cells_are_floors(tmp_path: Path) -> None:
-    config = write_config(tmp_path)
-    study, text = load_study(config), io.StringIO()
-    rows = preview(study, planning.plan(study), Store(tmp_path / "out"), threads=1, workers=1)
-    Console(file=text, width=160).print(table(study, rows))
-    assert "floor images, no method" in text.getvalue()
-    assert "all, 18 of them floors" in text.getvalue()
+def bar(task: planning.Task, is_whole: bool) -> str:
+    """What a terminal shows of a run with 90 s left."""
+    text = io.StringIO()
+    with watching(Console(file=text, force_terminal=True, width=120)) as watch:
+        watch.planned(2, 2, 0)
+        watch.expects(lambda: 90.0, lambda: is_whole)
+        watch.started(task)
+    return text.getvalue()
 
 
-def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
-    task = planning.plan(load_study(write_config(tmp_path))).tasks[-1]
+def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task: planning.Task) -> None:
     now, left, lines = [0.0], [None, 90.0], list[str]()
     watch = Lines(lines.append, clock=lambda: now[0])
     watch.planned(2, 2, 0)
@@ -128,21 +125,15 @@ def test_lines_and_bar_show_the_time_left_of_the_run(tmp_path: Path) -> None:
         left.pop(0) if len(left) > 1 else None
     assert ["left" in line for line in lines[1:]] == [False, True]
     assert ", about 90 s left; now" in lines[-1]
-    text = io.StringIO()
-    with watching(Console(file=text, force_terminal=True, width=120)) as bar:
-        bar.planned(2, 2, 0)
-        bar.expects(lambda: 90.0)
-        bar.started(task)
-    assert "about 90 s" in text.getvalue()
-    assert "at least" not in text.getvalue()
-    with watching(Console(file=text, force_terminal=True, width=120)) as bar:
-        bar.planned(2, 2, 0)
-        bar.expects(lambda: 90.0, lambda: False)
-    assert "at least 90 s" in text.getvalue()
-    watch.expects(lambda: 90.0, lambda: False)
-    now[0] += 10
-    watch.started(task)
-    assert ", at least 90 s left; now" in lines[-1]
+    for seconds, said in ((90.0, ", at least 90 s left; now"), (0.2, "")):  # a lower limit of nothing is not said
+        watch.expects(lambda: seconds, lambda: False)  # noqa: B023
+        now[0] += 10
+        watch.started(task)
+        assert said in lines[-1]
+        assert ("left" in lines[-1]) == bool(said)
+    assert "about 90 s" in bar(task, True)
+    assert "at least" not in bar(task, True)
+    assert "at least 90 s" in bar(task, False)
 
 
 @pytest.mark.parametrize(
@@ -152,39 +143,23 @@ def test_a_time_is_said_in_the_unit_that_people_would_use(seconds: float, words:
     assert duration(seconds) == words
 
 
-def test_a_lower_limit_of_nothing_is_not_said(tmp_path: Path) -> None:
-    lines = list[str]()
-    watch = Lines(lines.append, clock=iter((0.0, 10.0)).__next__)
-    watch.expects(lambda: 0.2, lambda: False)
-    watch.started(planning.plan(load_study(write_config(tmp_path))).tasks[-1])
-    assert lines
-    assert "left" not in lines[-1]
-
-
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_says_what_is_left_of_it_and_ends_with_nothing(tmp_path: Path) -> None:
-    study = load_study(write_config(tmp_path))
-    seen: list[float | None] = []
+def test_a_run_says_what_is_left_of_it_and_a_single_worker_tries_every_method_before_it_repeats_one(
+    tmp_path: Path,
+) -> None:
+    study = load_study(write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing")))
+    left, started = list[float | None](), list[str]()
 
     class Asking(Lines):
+        def started(self, task: planning.Task) -> None:
+            super().started(task)
+            started.append(task.label)
+
         def finished(self, records: list[Record]) -> None:
             super().finished(records)
-            seen.append(self.seconds_left())
+            left.append(self.seconds_left())
 
     run(study, planning.plan(study), tmp_path / "out", Serial(), Asking(lambda line: None), 1, tmp_path / "artifacts")
-    assert all(seconds is not None and seconds >= 0 for seconds in seen)
-    assert seen[-1] == 0
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
-    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"))
-    study = load_study(config)
-    seen: list[str] = []
-
-    class Naming(Lines):
-        def started(self, task: planning.Task) -> None:
-            seen.append(task.label)
-
-    run(study, planning.plan(study), tmp_path / "out", Serial(), Naming(lambda line: None), 1, tmp_path / "artifacts")
-    assert seen == ["floor", "Toy", "Seeing", "floor", "floor", "Toy", "Toy", "Seeing", "Seeing"]
+    assert all(seconds is not None and seconds >= 0 for seconds in left)
+    assert left[-1] == 0
+    assert started == ["floor", "Toy", "Seeing", "floor", "floor", "Toy", "Toy", "Seeing", "Seeing"]

@@ -32,29 +32,21 @@ def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_resumed_run_keeps_the_runs_it_completes(tmp_path: Path) -> None:
-    config = write_config(tmp_path, count=1)
-    first = compute(config, tmp_path / "out").provenance
+def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_computed(tmp_path: Path) -> None:
+    config, store = write_config(tmp_path, count=1), Store(tmp_path / "out")
+    first = compute(config, store.output).provenance
     cells = plan(load_study(config)).cells
-    Store(tmp_path / "out").path(cells[0].id).unlink()
-    second = compute(config, tmp_path / "out").provenance
-    first.pop("earlier")
-    assert second["earlier"] == [first]
-    for cell in cells:
-        Store(tmp_path / "out").path(cell.id).unlink()
-    assert compute(config, tmp_path / "out").provenance["earlier"] == []
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_config_that_needs_nothing_computed_is_noted_all_the_same(tmp_path: Path) -> None:
-    first = compute(write_config(tmp_path, count=1), tmp_path / "out").provenance
+    store.path(cells[0].id).unlink()
+    second = compute(config, store.output).provenance
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: renamed}',), count=1)
-    second = compute(config, tmp_path / "out").provenance
-    assert second["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
-    assert second["ended"]
-    first.pop("earlier")
-    assert second["earlier"] == [first]
-    assert compute(config, tmp_path / "out").provenance == second
+    third = compute(config, store.output).provenance
+    assert [run["started"] for run in third["earlier"]] == [first["started"], second["started"]]
+    assert third["earlier"][0] == {key: value for key, value in first.items() if key != "earlier"}
+    assert third["config_sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
+    assert third["ended"]
+    assert compute(config, store.output).provenance == third
+    store.remove(cell.id for cell in cells)
+    assert compute(config, store.output).provenance["earlier"] == []
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"earlier": 5}', '{"earlier": [5]}', "[" * 200_000])

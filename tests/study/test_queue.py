@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -12,38 +13,23 @@ from holobench_eval.study.queue import DRAWING_SECONDS, Queue
 
 
 @dataclass(frozen=True)
-class FakeCell:
-    prepared: tuple[str, ...]
-    starts: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class FakeJob:
+    """A job of a label and a number. needs: trainings; starts: other jobs."""
+
     name: str
     needs: tuple[str, ...] = ()
     alone: bool = False
     starts: tuple[str, ...] = ()
 
-    @property
-    def wanted(self) -> frozenset[str]:
-        return frozenset({self.name})
-
-    @property
-    def task(self) -> SimpleNamespace:
-        return SimpleNamespace(label=self.name.split()[0])
-
-    @property
-    def cells(self) -> list[tuple[FakeCell, None]]:
-        return [(FakeCell(self.needs, self.starts), None)]
+    wanted = property(lambda self: frozenset({self.name}))
+    task = property(lambda self: SimpleNamespace(label=self.name.split()[0]))
+    cells = property(lambda self: [(SimpleNamespace(prepared=self.needs, starts=self.starts), None)])
 
 
 @dataclass(frozen=True)
 class FakeTraining:
     name: str
-
-    @property
-    def preparation(self) -> SimpleNamespace:
-        return SimpleNamespace(id=self.name)
+    preparation = property(lambda self: SimpleNamespace(id=self.name))
 
 
 JOBS: Any = [FakeJob("a", ("one",)), FakeJob("b"), FakeJob("c", ("two",)), FakeJob("d", ("one", "two"))]
@@ -76,19 +62,11 @@ class Executor:
         return left
 
 
-def test_cells_that_wait_for_nothing_come_right_after_the_trainings() -> None:
+def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_right_after_the_trainings_without_any() -> None:
     executor = Executor(TRAININGS, JOBS)
-    assert [executor.take() for _ in range(3)] == [*TRAININGS, JOBS[1]]
-
-
-def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_none_is_lost() -> None:
-    executor = Executor(TRAININGS, JOBS)
-    assert [executor.take() for _ in range(3)][-1] is JOBS[1]
-    assert executor.take() is None
+    assert [executor.take() for _ in range(4)] == [*TRAININGS, JOBS[1], None]
     executor.end(TRAININGS[1])
-    assert executor.take() is JOBS[2]
-    assert executor.take() is None
-    assert executor.take() is None
+    assert [executor.take() for _ in range(3)] == [JOBS[2], None, None]
     executor.end(TRAININGS[0])
     assert executor.rest() == [JOBS[0], JOBS[3]]
 
@@ -104,40 +82,40 @@ def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work()
     executor.end(other)
     assert executor.take() is None
     executor.end(TRAININGS[0])
-    assert executor.take() is first
-    assert executor.take() is None
+    assert [executor.take() for _ in range(2)] == [first, None]
     executor.end(first)
     assert executor.rest() == [last]
 
 
-def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def lasts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Takes a job of an executor, which ends after some seconds."""
     clock = [0.0]
     monkeypatch.setattr("time.monotonic", lambda: clock[0])
-    labels = ("short 1", "short 2", "short 3", "long 1", "long 2", "long 3", "new 1")
-    jobs: Any = [FakeJob(label) for label in labels]
-    executor = Executor([], jobs)
 
-    def ended(seconds: float) -> Any:
+    def lasts(executor: Executor, seconds: float) -> Any:
         job = executor.take()
         clock[0] += seconds
         executor.end(job, job.task.label)
         return job
 
-    assert [ended(1.0), ended(5.0), ended(2.0)] == [jobs[0], jobs[3], jobs[6]]  # of no label is the time known
-    assert ended(0.5) is jobs[4]
+    return lasts
+
+
+def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(lasts: Callable[..., Any]) -> None:
+    labels = ("short 1", "short 2", "short 3", "long 1", "long 2", "long 3", "new 1")
+    jobs: Any = [FakeJob(label) for label in labels]
+    executor = Executor([], jobs)
+    found = [lasts(executor, seconds) for seconds in (1.0, 5.0, 2.0, 0.5)]
+    assert found == [jobs[0], jobs[3], jobs[6], jobs[4]]  # of no label is the time known at first
     assert executor.rest() == [jobs[1], jobs[2], jobs[5]]
 
 
-def test_a_drawing_comes_before_the_jobs_that_are_shorter(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = [0.0]
-    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+def test_a_drawing_comes_before_the_jobs_that_are_shorter(lasts: Callable[..., Any]) -> None:
     jobs: Any = [FakeJob("long 1"), FakeJob("short 1"), FakeJob("long 2"), FakeJob("short 2")]
     drawing: Any = FakeTraining("drawing")
     executor = Executor([], jobs, drawings=[drawing])
-    for job, seconds in ((jobs[0], DRAWING_SECONDS + 1), (jobs[1], DRAWING_SECONDS - 1)):
-        assert executor.take() is job
-        clock[0] += seconds
-        executor.end(job, job.task.label)
+    assert [lasts(executor, DRAWING_SECONDS + more) for more in (1, -1)] == jobs[:2]
     assert executor.rest() == [jobs[2], drawing, jobs[3]]
 
 

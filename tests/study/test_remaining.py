@@ -29,14 +29,6 @@ def compute(remaining: Remaining, clock: Clock, row: Kind, seconds: float, alone
     remaining.ends(row)
 
 
-def test_nothing_is_said_before_anything_is_known(clock: Clock) -> None:
-    remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
-    assert remaining.seconds() is None
-    remaining.begins("first", SLOW, False)
-    clock.now += 5
-    assert remaining.seconds() is None
-
-
 def test_the_longest_first_do_not_make_the_rest_look_long(clock: Clock) -> None:
     remaining = Remaining([(row, False) for row in ROWS for _ in range(5)], {}, 1, clock)
     for row, seconds in ROWS.items():  # each row once, since none is known; then the longest
@@ -46,14 +38,17 @@ def test_the_longest_first_do_not_make_the_rest_look_long(clock: Clock) -> None:
         assert remaining.seconds() == pytest.approx(left * ROWS[SLOW] + 4 * ROWS[QUICK])
 
 
-def test_time_passes_while_a_task_is_at_work_and_never_runs_out(clock: Clock) -> None:
+def test_time_is_unknown_at_first_passes_while_a_task_is_at_work_and_never_runs_out(clock: Clock) -> None:
     remaining = Remaining([(SLOW, False)] * 2, {}, 1, clock)
-    compute(remaining, clock, SLOW, 20)
+    assert remaining.seconds() is None
+    remaining.begins("first", SLOW, False)
+    clock.now += 20
+    assert remaining.seconds() is None
+    remaining.ends("first")
     remaining.begins("second", SLOW, False)
-    clock.now += 15
-    assert remaining.seconds() == pytest.approx(5)
-    clock.now += 15
-    assert remaining.seconds() == 0
+    for left in (5, 0):
+        clock.now += 15
+        assert remaining.seconds() == pytest.approx(left)
     remaining.ends("second")
     assert remaining.seconds() == 0
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -65,23 +67,58 @@ def done(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     return count
 
 
+def written(folder: Path, text: str = PICTURE, metrics: str = ONE) -> Path:
+    """The config of a study by some metrics."""
+    path = trained_study.write(folder)
+    path.write_text(text.replace(ONE, metrics))
+    return path
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Gives the folder of a study that was computed once, which no test changes."""
+
+    @cache
+    def computed(measure: str, metrics: str) -> Path:
+        folder = tmp_path_factory.mktemp("base")
+        with pytest.MonkeyPatch.context() as patch:
+            another_metric.add(folder, patch)
+            compute(written(folder, MEASURES[measure], metrics))
+        return folder
+
+    return computed
+
+
 @pytest.fixture
-def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """Writes a study; the metric is there, and it names it or not."""
+def study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: Callable[..., Path], done: Counter[str]
+) -> Callable[..., Path]:
+    """Gives the config of a study that was computed by a metric less than it names now."""
     another_metric.add(tmp_path, monkeypatch)
 
-    def written(text: str = PICTURE, metrics: str = ONE) -> Path:
-        path = trained_study.write(tmp_path)
-        path.write_text(text.replace(ONE, metrics))
-        return path
+    def computed(measure: str = "picture", metrics: str = BOTH) -> Path:
+        shutil.copytree(base(measure, ONE) / "out", tmp_path / "out")
+        done.clear()
+        return written(tmp_path, MEASURES[measure], metrics)
 
-    return written
+    return computed
 
 
-def measured(outcome: Outcome) -> list[dict[str, Any]]:
+@pytest.fixture
+def fresh(base: Callable[..., Path]) -> Callable[[str], list[dict[str, Any]]]:
+    """Gives the records of a study that was computed by both metrics at once."""
+
+    def records(measure: str = "picture") -> list[dict[str, Any]]:
+        folder = base(measure, BOTH)
+        return measured(Store(folder / "out").load(plan(load_study(folder / "study.yaml"))))
+
+    return records
+
+
+def measured(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Records without what each run measures itself, and without whether their phases were known before."""
-    assert {record["state"] for record in outcome.records} == {"done"}, [r["reason"] for r in outcome.records]
-    return [{**one, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": None} for one in outcome.records]
+    assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
+    return [{**one, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": None} for one in records]
 
 
 def cells(config: Path) -> list[Cell]:
@@ -102,103 +139,78 @@ def column(outcome: Outcome, name: str = COLUMN) -> list[float | None]:
     return [record["scores"].get(name) for record in outcome.records]
 
 
+Study = Callable[..., Path]
+Fresh = Callable[..., list[dict[str, Any]]]
+
+
 @pytest.mark.parametrize("measure", MEASURES)
 def test_a_new_metric_is_filled_from_kept_captures_to_the_last_digit_of_a_fresh_run(
-    study: Callable[..., Path], done: Counter[str], measure: str
+    study: Study, fresh: Fresh, done: Counter[str], measure: str
 ) -> None:
-    compute(study(MEASURES[measure]))
-    done.clear()
-    config = study(MEASURES[measure], BOTH)
-    grid = plan(load_study(config))
-    frame = records_frame(Store(config.parent / "out").load(grid), layout_of(load_study(config)))
+    config = study(measure)
+    grid, store = plan(load_study(config)), Store(config.parent / "out")
+    before = store.load(grid)
+    frame = records_frame(before, layout_of(load_study(config)))
     assert difference(frame, grid) == ""
     again = compute(config, rescore=(NAME,))
     assert done == {}
     assert (again.computed, again.solved, again.rescored, again.unscored) == (0, 0, len(again.records), 0)
     assert None not in column(again)
-    assert measured(again) == measured(compute(config, "fresh"))
+    assert measured(again.records) == fresh(measure)
+    assert untold(again.records) == untold(before)
     assert compute(config, rescore=(NAME,)).rescored == 0
 
 
-def test_a_run_fills_the_column_too_and_solves_nothing(study: Callable[..., Path], done: Counter[str]) -> None:
-    first = compute(study())
-    done.clear()
-    outcome = compute(study(metrics=BOTH))
+def untold(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Records without their scores: what a run has measured."""
+    return [{**record, "scores": None} for record in records]
+
+
+def test_a_run_fills_the_column_too_and_solves_nothing(study: Study, done: Counter[str]) -> None:
+    config = study()
+    grid = plan(load_study(config))
+    first = [record["scores"]["psnr_linear"] for record in Store(config.parent / "out").load(grid)]
+    outcome = compute(config)
     assert done == {}
     assert (outcome.computed, outcome.rescored) == (0, len(outcome.records))
     assert None not in column(outcome)
-    assert column(outcome, "psnr_linear") == column(first, "psnr_linear")
-    assert provenance.read(study().parent / "out")["scores"] == plan(load_study(study(metrics=BOTH))).metrics
+    assert column(outcome, "psnr_linear") == first
+    assert provenance.read(config.parent / "out")["scores"] == grid.metrics
 
 
-def test_what_a_run_measured_stays_in_the_record(study: Callable[..., Path]) -> None:
-    def told(outcome: Outcome) -> list[dict[str, Any]]:
-        return [{**record, "scores": None} for record in outcome.records]
-
-    first = compute(study())
-    assert told(compute(study(metrics=BOTH), rescore=(NAME,))) == told(first)
-    forget(study(), phases=False)
-    another = BOTH.replace("psnr,", "psnr, gmsd,")
-    assert told(compute(study(metrics=another), rescore=("gmsd",))) == told(first)
-
-
-def test_a_metric_of_a_new_version_is_a_hole_until_it_is_scored_again(
-    study: Callable[..., Path], done: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    config = study(metrics=BOTH)
-    old = compute(config)
-    another_metric.add(tmp_path, monkeypatch, version=2)
-    grid, store = plan(load_study(config)), Store(tmp_path / "out")
-    assert set(store.states(grid.cells, metrics=grid.metrics).values()) == {"unscored"}
-    assert {record["scores"].get(COLUMN) for record in store.load(grid)} == {None}
-    assert [record["scores"]["psnr_linear"] for record in store.load(grid)] == column(old, "psnr_linear")
-    done.clear()
-    new = compute(config, rescore=(NAME,))
-    assert done == {}
-    assert column(new) == [pytest.approx(2 * value) for value in column(old) if value is not None]
-    assert measured(new) == measured(compute(config, "fresh"))
-
-
-def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study: Callable[..., Path]) -> None:
-    compute(study())
+def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study: Study) -> None:
     config = study(metrics=BOTH.replace("psnr,", "psnr, gmsd,"))
-    for lost in (False, True):  # once from captures, once from phases
-        if lost:
-            forget(config, phases=False)
-        wanted, other = (NAME, "gmsd") if not lost else ("gmsd", NAME)
-        outcome = compute(config, rescore=(wanted,))
-        assert None not in column(outcome, "psnr_linear")
-        assert (None in column(outcome, "gmsd_srgb")) == (not lost)
-        assert None not in column(outcome)
-        assert other in plan(load_study(config)).metrics
+    before = Store(config.parent / "out").load(plan(load_study(config)))
+    outcome = compute(config, rescore=(NAME,))  # from captures
+    assert None not in column(outcome, "psnr_linear") + column(outcome)
+    assert None in column(outcome, "gmsd_srgb")
+    forget(config, phases=False)
+    outcome = compute(config, rescore=("gmsd",))  # from phases
+    assert None not in column(outcome, "psnr_linear") + column(outcome) + column(outcome, "gmsd_srgb")
+    assert untold(outcome.records) == untold(before)
 
 
 @pytest.mark.parametrize("measure", ["picture", "focus"])
 def test_without_captures_phases_are_shown_again_to_the_same_bits(
-    study: Callable[..., Path], done: Counter[str], measure: str
+    study: Study, fresh: Fresh, done: Counter[str], measure: str
 ) -> None:
-    config = study(MEASURES[measure])
-    compute(config)
+    config = study(measure)
     store, every = Store(config.parent / "out"), cells(config)
     before = [store.capture(cell.id).read_bytes() for cell in every]
     forget(config, phases=False)
-    done.clear()
-    config = study(MEASURES[measure], BOTH)
     again = compute(config, rescore=(NAME,))
     assert done == {"photographed": len(every)}
     assert (again.solved, again.unscored) == (0, 0)
     assert [store.capture(cell.id).read_bytes() for cell in every] == before
-    assert measured(again) == measured(compute(config, "fresh"))
+    assert measured(again.records) == fresh(measure)
 
 
 @pytest.mark.parametrize("measure", MEASURES)
 def test_where_neither_is_kept_there_stays_a_hole_that_a_run_fills(
-    study: Callable[..., Path], done: Counter[str], measure: str
+    study: Study, fresh: Fresh, done: Counter[str], measure: str
 ) -> None:
-    compute(study(MEASURES[measure]))
-    config = study(MEASURES[measure], BOTH)
+    config = study(measure)
     forget(config)
-    done.clear()
     again = compute(config, rescore=(NAME,))
     assert done == {}
     holes = len(again.records) if measure == "prediction" else len(cells(config))  # whose floor needs a capture, too
@@ -206,33 +218,25 @@ def test_where_neither_is_kept_there_stays_a_hole_that_a_run_fills(
     assert column(again).count(None) == holes
     whole = compute(config)
     assert done["solved"] > 0
-    assert measured(whole) == measured(compute(config, "fresh"))
+    assert measured(whole.records) == fresh(measure)
 
 
-def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(
-    study: Callable[..., Path], done: Counter[str]
-) -> None:
-    bare = "save: {kept: false}\n"
+def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: Study, done: Counter[str]) -> None:
     config = study()
-    config.write_text(config.read_text() + bare)
-    compute(config)
-    assert not list((config.parent / "out" / "records").glob("*.npy"))
-    done.clear()
-    config = study(metrics=BOTH)
-    config.write_text(config.read_text() + bare)
+    config.write_text(f"{config.read_text()}save: {{kept: false}}\n")
+    forget(config, phases=False)
     again = compute(config, rescore=(NAME,))
     assert done == {"photographed": 2}
     assert None not in column(again)
+    assert not list((config.parent / "out" / "records").glob("*.npy"))
 
 
 @pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file"])
 def test_a_damaged_capture_is_never_a_score_and_its_phase_is_photographed_again(
-    study: Callable[..., Path], done: Counter[str], damage: str
+    study: Study, done: Counter[str], damage: str
 ) -> None:
-    compute(study())
-    config = study(metrics=BOTH)
-    store, (first, second) = Store(config.parent / "out"), cells(config)
-    file = store.capture(first.id)
+    config = study()
+    file = Store(config.parent / "out").capture(cells(config)[0].id)
     content = file.read_bytes()
     bad = {
         "truncated": content[: len(content) // 2],
@@ -241,18 +245,15 @@ def test_a_damaged_capture_is_never_a_score_and_its_phase_is_photographed_again(
         "another file": b"PNG" * 100,
     }
     file.write_bytes(bad[damage])
-    done.clear()
     again = compute(config, rescore=(NAME,))
     assert done == {"photographed": 1}
     assert (again.rescored, again.unscored) == (len(again.records), 0)
     assert file.read_bytes() == content
     assert None not in column(again)
-    assert second.id != first.id
 
 
-def test_records_are_those_of_another_study_only_where_the_captures_are(study: Callable[..., Path]) -> None:
-    config = study()
-    compute(config)
+def test_records_are_those_of_another_study_only_where_the_captures_are(study: Study) -> None:
+    config = study(metrics=ONE)
     config.write_text(config.read_text().replace("seed: 3", "seed: 4"))
     again = compute(config, rescore=("psnr",))
     assert (again.computed, again.rescored) == (0, 0)

@@ -21,9 +21,14 @@ from holobench_eval.study.store import SCHEMA, Record, Store, appears
 from tests.support.fake_study import write_config
 
 
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    return plan(load_study(write_config(tmp_path_factory.mktemp("study"), count=1)))
+
+
 @pytest.fixture
-def grid(tmp_path: Path) -> Plan:
-    return plan(load_study(write_config(tmp_path, count=1)))
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "out")
 
 
 def record_of(grid: Plan, **values: Any) -> Record:
@@ -35,16 +40,12 @@ def psnr(value: float, version: str | None = None) -> dict[str, Any]:
     return {"psnr": {"version": version or identity.versions()["psnr"], "values": {"psnr_linear": value}}}
 
 
-def test_a_record_is_read_as_it_was_written(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_a_record_is_read_as_it_was_written_and_an_absent_one_is_none(store: Store, grid: Plan) -> None:
     record = record_of(grid, scores=psnr(20.123456789012345), captures=3, seconds=0.1, saturated=1e-9)
+    assert store.read(record.id) is None
     store.write(record)
     assert store.read(record.id) == record
     assert record.id == grid.cells[-1].id
-
-
-def test_a_record_that_is_absent_is_none(tmp_path: Path) -> None:
-    assert Store(tmp_path).read("0" * 64) is None
 
 
 def edited(content: dict[str, Any], **entries: Any) -> str:
@@ -90,8 +91,8 @@ FAULTS: dict[str, Callable[[str, dict[str, Any]], str]] = {  # of the text and t
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> None:
-    store, record = Store(tmp_path / "out"), record_of(grid)
+def test_a_damaged_record_is_named(store: Store, grid: Plan, fault: str) -> None:
+    record = record_of(grid)
     store.write(record)
     path = store.path(record.id)
     text = path.read_text()
@@ -102,31 +103,29 @@ def test_a_damaged_record_is_named(tmp_path: Path, grid: Plan, fault: str) -> No
     assert len(str(error.value)) < 400
 
 
-def test_a_planned_cell_without_a_record_is_shown_as_missing(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_planned_cells_without_a_record_are_missing_and_records_of_other_studies_are_left_alone(
+    store: Store, grid: Plan
+) -> None:
     store.write(record_of(grid))
+    (store.folder / "foreign.json").write_text("nothing")
     states = [record["state"] for record in store.load(grid)]
     assert states == ["missing"] * 5 + ["done"]
 
 
-def test_records_of_other_studies_are_left_alone(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
-    store.folder.mkdir(parents=True)
-    (store.folder / "foreign.json").write_text("nothing")
-    assert set(store.states(grid.cells).values()) == {"missing"}
-
-
-def test_a_score_that_json_cannot_hold_is_not_written(tmp_path: Path, grid: Plan) -> None:
-    with pytest.raises(UserError, match="finite numbers"):
-        Store(tmp_path).write(record_of(grid, scores=psnr(float("inf"))))
-    assert not list(Store(tmp_path).folder.glob("*.json"))
-
-
-@pytest.mark.parametrize("wrong", [{"captures": 3.0}, {"memory_mib": -1.0}, {"reason": "x" * 2_000_000}])
-def test_what_could_not_be_read_again_is_not_written(tmp_path: Path, grid: Plan, wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="delete the file"):
-        Store(tmp_path).write(record_of(grid, **wrong))
-    assert not list(Store(tmp_path).folder.glob("*.json"))
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"captures": 3.0}, "delete the file"),
+        ({"memory_mib": -1.0}, "delete the file"),
+        ({"scores": psnr(float("inf"))}, "finite numbers"),  # which JSON cannot hold
+    ],
+)
+def test_what_could_not_be_read_again_is_not_written(
+    store: Store, grid: Plan, wrong: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UserError, match=message):
+        store.write(record_of(grid, **wrong))
+    assert not list(store.folder.glob("*.json"))
 
 
 def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path: Path) -> None:
@@ -136,20 +135,16 @@ def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
-def test_rests_of_a_killed_run_are_removed(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    store.folder.mkdir()
-    (store.folder / ".writing-abc").write_text("half")
+def test_a_run_makes_its_folder_locks_it_and_removes_the_rests_of_a_killed_run(tmp_path: Path) -> None:
+    store = Store(tmp_path / "a" / "b")
     with store.locked():
-        assert [path.name for path in store.folder.iterdir()] == [".lock"]
-
-
-def test_the_lock_is_free_again_after_its_run(tmp_path: Path) -> None:
-    store = Store(tmp_path)
+        (store.folder / ".writing-abc").write_text("half")
     with pytest.raises(RuntimeError), store.locked():
         raise RuntimeError
-    with store.locked(), pytest.raises(UserError, match="another run"), Store(tmp_path).locked():
-        pass
+    with store.locked():  # free again after its run
+        assert [path.name for path in store.folder.iterdir()] == [".lock"]
+        with pytest.raises(UserError, match="another run"), Store(store.output).locked():
+            pass
 
 
 def test_names_of_files_stay_in_their_folder() -> None:
@@ -163,8 +158,7 @@ def test_different_names_get_different_files(one: str, other: str) -> None:
     assert (file_name(one) == file_name(other)) == (one == other)
 
 
-def test_a_failure_never_replaces_a_score(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_a_failure_never_replaces_a_score(store: Store, grid: Plan) -> None:
     done = record_of(grid, scores=psnr(20.0))
     failed = Record(done.capture, "failed", "Toy", "ZeroDivisionError")
     store.write(failed)
@@ -173,16 +167,15 @@ def test_a_failure_never_replaces_a_score(tmp_path: Path, grid: Plan) -> None:
     assert store.read(done.id) == done
 
 
-def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(store: Store, grid: Plan) -> None:
     store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
     assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
 
 
 def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_scored(
-    tmp_path: Path, grid: Plan
+    store: Store, grid: Plan
 ) -> None:
-    store, (first, second, third, fourth, *rest) = Store(tmp_path / "out"), grid.cells
+    first, second, third, fourth, *rest = grid.cells
     store.write(Record(first.description(), "failed", "Toy", reason="ZeroDivisionError"))
     store.write(Record(second.description(), "done", "Toy", alone=False, scores=psnr(20.0)))
     store.write(Record(third.description(), "skipped", "Toy", reason="no camera"))
@@ -199,27 +192,21 @@ def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_
     assert states(second, metrics=today | {"ssim": "v2, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]
 
 
-def test_a_score_of_another_version_of_its_metric_is_a_hole(tmp_path: Path, grid: Plan) -> None:
+def test_a_score_of_another_version_of_its_metric_is_a_hole(grid: Plan) -> None:
     old = psnr(20.0, "v2, 0") | {"ssim": {"version": identity.versions()["ssim"], "values": {"ssim_linear": 0.5}}}
     record = record_of(grid, scores=old, figures={"efficiency": 0.4})
     assert record.values() == {"ssim_linear": 0.5, "efficiency": 0.4}
     assert record.row(grid.cells[-1].facts())["scores"] == record.values()
 
 
-def absent(store: Store, grid: Plan) -> list[str]:
-    return [name for name, state in store.states(grid.cells).items() if state == "missing"]
-
-
-def test_only_named_records_are_removed(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_only_named_records_are_removed(store: Store, grid: Plan) -> None:
     for cell in grid.cells:
         store.write(Record(cell.description(), "done", "Toy"))
     store.remove([grid.cells[0].id, "0" * 64])
-    assert absent(store, grid) == [grid.cells[0].id]
+    assert [name for name, state in store.states(grid.cells).items() if state == "missing"] == [grid.cells[0].id]
 
 
-def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(tmp_path: Path, grid: Plan) -> None:
-    store = Store(tmp_path / "out")
+def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(store: Store, grid: Plan) -> None:
     store.write(record_of(grid, reason=""))
     room = 1_000_000 - store.path(grid.cells[-1].id).stat().st_size
     largest = record_of(grid, reason="x" * room)
@@ -228,21 +215,6 @@ def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(
     assert store.read(largest.id) == largest
     with pytest.raises(UserError, match="not a record"):
         store.write(record_of(grid, reason="x" * (room + 1)))
-
-
-def test_a_run_makes_its_folder_and_those_above_it(tmp_path: Path) -> None:
-    store = Store(tmp_path / "a" / "b")
-    for _ in range(2):
-        with store.locked():
-            assert store.folder.is_dir()
-
-
-def test_what_belongs_to_a_cell_lies_beside_its_record_in_files_of_their_own(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    files = [store.path("ab"), store.log("ab"), store.thumbnail("ab"), store.capture("ab")]
-    files.append(store.target_thumbnail("ab"))
-    assert [file.name for file in files] == ["ab.json", "ab.log", "ab.png", "ab.npy", "target-ab.png"]
-    assert {file.parent for file in files} == {store.folder}
 
 
 def test_a_file_is_waited_for_until_it_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,8 @@ import pytest
 
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Task, plan
+from holobench_eval.study.plan import plan
+from tests.study.test_run import add_other_profile
 from tests.support.fake_study import write_config
 
 
@@ -16,23 +17,15 @@ def every_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cost, "APART", 0.0)
 
 
-@pytest.fixture
-def task(tmp_path: Path) -> Task:
-    return plan(load_study(write_config(tmp_path))).tasks[-1]
-
-
-def test_the_last_measurement_is_the_one_that_estimates_use() -> None:
-    cost.keep("a", 2.5)
-    assert cost.recorded("a") == 2.5
-    cost.keep("a", 9.0)
-    assert cost.recorded("a") == 9.0
-
-
-def test_many_solutions_write_few_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost, "APART", 1000.0)
+def test_the_last_measurement_is_the_one_that_estimates_use_and_many_write_few_files(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for seconds in (2.5, 9.0):
-        cost.keep("b", seconds)
-    assert cost.recorded("b") == 2.5
+        cost.keep("a", seconds)
+        assert cost.recorded("a") == seconds
+    monkeypatch.setattr(cost, "APART", 1000.0)
+    cost.keep("a", 4.0)
+    assert cost.recorded("a") == 9.0
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", "x", "-1", "NaN", "inf", "\xff"])
@@ -52,8 +45,6 @@ def test_without_a_folder_to_write_to_there_are_no_estimates(tmp_path: Path, mon
 
 
 def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:
-    from tests.study.test_run import add_other_profile
-
     add_other_profile(tmp_path)
     config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
     config.write_text(f"{config.read_text()}repeats: 2\ntiming: alone\n")
@@ -70,11 +61,10 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
     assert not cost.timed(replace(study, timing="shared"), grid)
 
 
-def test_targets_share_a_time_and_threads_workers_and_methods_do_not(task: Task, tmp_path: Path) -> None:
+def test_targets_share_a_time_and_threads_workers_and_methods_do_not(tmp_path: Path) -> None:
     first, second = plan(load_study(write_config(tmp_path))).tasks[-2:]
     assert first.cells[0].target != second.cells[0].target
-    assert cost.key(first, 1, 1) == cost.key(second, 1, 1)
-    other = replace(task, cells=(replace(task.cells[0], phase={**task.cells[0].phase, "code": "changed"}),))
-    keys = {cost.key(task, 1, 1), cost.key(task, 2, 1), cost.key(task, 1, 2), cost.key(other, 1, 1)}
+    assert cost.key(first, 1, 1) == cost.key(second, 1, 1) == cost.key(replace(first, label="renamed"), 1, 1)
+    other = replace(first, cells=(replace(first.cells[0], phase={**first.cells[0].phase, "code": "changed"}),))
+    keys = {cost.key(first, 1, 1), cost.key(first, 2, 1), cost.key(first, 1, 2), cost.key(other, 1, 1)}
     assert len(keys) == 4
-    assert cost.key(task, 1, 1) == cost.key(replace(task, label="renamed"), 1, 1)

@@ -1,10 +1,7 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -18,6 +15,7 @@ from holobench_eval.core.io import TEMPORARY
 from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
+from holobench_eval.study.executors.processes import start
 from holobench_eval.study.plan import plan
 from holobench_eval.study.progress import Follower, Lines
 from holobench_eval.study.run import run
@@ -66,6 +64,7 @@ def test_a_budget_that_is_enough_changes_nothing_but_the_name(tmp_path: Path) ->
     free = write(tmp_path)
     compute(free)
     before = artifact_of(free)
+    assert {"estimates", "missing"}.isdisjoint(json.loads((before / PROVENANCE).read_text()))  # a method tells none
     metered = write(tmp_path, ("held_out: 1", "held_out: 1, captures: 2"))
     assert compute(metered, "metered").failed == 0
     assert artifact_of(metered) != before
@@ -130,21 +129,25 @@ def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:
     assert state == {"held out": 2}
 
 
+def compute_apart(config: Path) -> None:
+    """Compute with the fakes in a process that a test kills."""
+    fake_study.install()
+    compute(config)
+
+
 @pytest.mark.slow
 def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_that_was_not(tmp_path: Path) -> None:
     config = write(tmp_path, gain(rounds=5, pause=0.15))
-    command = [sys.executable, str(Path(fake_study.__file__)), "run", str(config), "--executor", "serial"]
-    killed = subprocess.Popen(
-        [*command, "--output", str(tmp_path / "out"), "--artifacts", str(tmp_path / "artifacts")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        env=os.environ | {"MPLBACKEND": "agg"},
-    )
     place = artifact_of(config)
-    wait_for_captures(place, 3, killed)
+    killed = start(compute_apart, config)
+    deadline = time.monotonic() + PATIENCE
+    while progress(place)[0] != 3:
+        assert killed.is_alive()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
     killed.kill()
-    killed.communicate(timeout=PATIENCE)
-    assert killed.returncode == -signal.SIGKILL
+    killed.join()
+    assert killed.exitcode == -signal.SIGKILL
     assert not (place / STATE).exists()
     (place / "unfinished" / f"{TEMPORARY}left").write_bytes(b"half")
     (place / f"{TEMPORARY}left").write_bytes(b"half")
@@ -167,14 +170,6 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     assert [[row["round"] for row in log] for log in logs] == [list("01234")] * 2
     assert [row["gain"] for row in logs[0]] == [row["gain"] for row in logs[1]]
     assert list(place.rglob(f"{TEMPORARY}*")) == []
-
-
-def wait_for_captures(artifact: Path, count: int, process: subprocess.Popen[bytes]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while progress(artifact)[0] != count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def test_artifacts_that_several_runs_need_at_once_are_made_by_one_of_them(tmp_path: Path) -> None:

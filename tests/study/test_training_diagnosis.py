@@ -48,22 +48,13 @@ def provenance(folder: Path, form: str) -> dict[str, Any]:
 
 
 @pytest.mark.usefixtures("known")
-def test_estimates_are_kept_beside_the_truth(tmp_path: Path) -> None:
-    kept = provenance(tmp_path, "[]")
+@pytest.mark.parametrize(("form", "missing"), [("[]", ["phase in steps of 2 pi / 256"]), ("['quantisation']", [])])
+def test_estimates_are_kept_beside_the_truth_and_what_the_form_has_not(
+    tmp_path: Path, form: str, missing: list[str]
+) -> None:
+    kept = provenance(tmp_path, form)
     rows = kept["estimates"]
     assert [(row["name"], row["colour"]) for row in rows] == [("phase_gain", colour) for colour in range(3)]
     assert [row["truth"] for row in rows] == pytest.approx([1, 1, 1], abs=1e-5)
     assert all(isinstance(row["value"], float) and row["value"] != row["truth"] for row in rows)
-    assert kept["missing"] == ["phase in steps of 2 pi / 256"]
-
-
-@pytest.mark.usefixtures("known")
-def test_what_the_form_has_is_not_missing(tmp_path: Path) -> None:
-    assert provenance(tmp_path, "['quantisation']")["missing"] == []
-
-
-def test_a_method_that_tells_nothing_leaves_no_trace_of_it(tmp_path: Path) -> None:
-    config = write(tmp_path)
-    compute(config)
-    kept = json.loads((artifact_of(config) / PROVENANCE).read_text())
-    assert {"estimates", "missing"}.isdisjoint(kept)
+    assert kept["missing"] == missing

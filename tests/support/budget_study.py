@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from holobench_eval.report import Layout
+from holobench_eval.report import Layout, Results, records_frame
 from tests.support import synthetic_study as synthetic
 
 ROWS: dict[str, tuple[str, float, int, int, float]] = {
@@ -61,3 +61,8 @@ def study() -> list[synthetic.Record]:
                 noise = rng.normal(0, 0.5 * abs(gain) ** 0.5)
                 records.append(record(label, target, condition, level[target] + severity * (gain + noise)))
     return records
+
+
+def results(**changes: Any) -> Results:
+    """The numbers of the study; changes: of its layout."""
+    return Results(records_frame(study(), layout(**changes)), layout(**changes))

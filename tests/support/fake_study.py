@@ -13,15 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-import pandas as pd
 import torch
 from torch import Tensor
 
 from holobench_eval.core.seeds import generator
 from holobench_eval.display import CalibratedBench, MeteredDisplay, load_profile
-from holobench_eval.display.account import Journal
 from holobench_eval.display.api import Capture
-from holobench_eval.display.metered import Known
 from holobench_eval.study import opening
 from holobench_eval.study.scoring import reference, scores
 from holobench_eval.study.scoring.cell import work
@@ -161,21 +158,10 @@ class FakeBench:
         self.spec, self.bench = spec, self
 
     def for_method(
-        self,
-        method: Any,
-        label: str,
-        target: Tensor,
-        item: str,
-        repeat: int,
-        budget: int | None = None,
-        learned: Any = None,
-        starts: Any = (),
-        sha256: str = "",
-        known: Known | None = None,
-        journal: Journal | None = None,
+        self, method: Any, label: str, target: Tensor, item: str, repeat: int, sha256: str = "", **given: Any
     ) -> MeteredDisplay:
-        given = (method, budget, learned, starts, item, sha256, known, journal)
-        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), *given)
+        given |= {"target_name": item, "target_sha256": sha256}
+        return MeteredDisplay(cast(CalibratedBench, self), label, target, (item, repeat), method, **given)
 
     def photograph(self, phase: Tensor, target: Tensor, **names: Any) -> Any:
         shade = 0.5 + phase.mean() / 100 + names["repeat"] / 1000
@@ -253,14 +239,6 @@ def noted_work(task: Job) -> list[Record]:
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Records without what each run measures itself."""
     return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": False} for record in records]
-
-
-def untimed_table(path: Path) -> str:
-    """The text of table.csv or records.csv without its columns of time and memory."""
-    frame = pd.read_csv(path, dtype=str, keep_default_na=False)
-    timed = [name for name in frame if name.endswith(("_s", "_mib"))]
-    assert timed
-    return frame.drop(columns=timed).to_csv()
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ from skimage import data, io, transform
 from skimage.metrics import structural_similarity
 
 from holobench_eval.core.hashing import digest
-from holobench_eval.report import Layout
-from holobench_eval.study.plan import FLOORS, REFERENCE
+from holobench_eval.report import Layout, Results, records_frame
+from holobench_eval.study.plan import FLOORS, REFERENCE, is_reference
 from holobench_eval.study.store import Store
 
 Image = NDArray[np.float64]
@@ -47,6 +48,7 @@ def layout(**changes: Any) -> Layout:
     return Layout(**(given | changes))
 
 
+@cache
 def photographs(size: int) -> dict[str, Image]:
     """Linear-light (size, size, 3) targets."""
     pictures = {}
@@ -144,6 +146,16 @@ def record(label: str, described: dict[str, Any], values: dict[str, float], **ch
         "saturated": None if described["condition"] == REFERENCE else 0.0002,
     }
     return given | changes
+
+
+def results(records: list[Record], **changes: Any) -> Results:
+    """The numbers of some records, whose layout is theirs but for the changes."""
+    cells = [(found["label"], found["cell"]) for found in records]
+    pairs = dict.fromkeys((label, cell["condition"]) for label, cell in cells if not is_reference(cell["condition"]))
+    targets = dict.fromkeys(cell["target"] for _, cell in cells)
+    given = {"pairs": tuple(pairs), "targets": tuple(targets), "privileged": frozenset(), "reported": {}}
+    made = layout(**(given | changes))
+    return Results(records_frame(records, made), made)
 
 
 def save_picture(path: Path, linear: Image) -> None:

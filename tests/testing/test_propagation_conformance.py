@@ -18,14 +18,6 @@ def found(make, check, **claims):
     return finding(Subject(make, **claims), *chosen)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
-def test_every_propagator_of_the_package_conforms_to_its_claims(name):
-    subject = SHIPPED[name]
-    findings = check_propagator(subject.make, subject.physics, subject.band)
-    assert len(findings) == len(CHECKS)
-    assert [each for each in findings if each.verdict != "PASS"] == []
-
-
 class Written:
     """An angular spectrum written out here, with the mistakes that the kit is there to catch."""
 
@@ -227,10 +219,6 @@ def test_an_exception_is_the_finding_of_one_check_and_not_the_end(error):
     assert failed.check.startswith("white field, odd")
     assert f"raises {type(error).__name__}" in failed.note
     assert "\n" not in failed.note
-
-
-def test_a_function_may_take_the_place_of_a_class():
-    assert found(lambda *arguments: AngularSpectrum(*arguments).forward, "direct sum").verdict == "PASS"
 
 
 def test_the_table_is_printed_with_causes_and_counted(capsys):

@@ -10,7 +10,7 @@ from tests.support.records_on_disk import write_report
 BASE = [20.0, 21.0, 22.0, 23.0]
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def worse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two reports, ``a`` and ``b``, of which the second is 1 dB worse by one method."""
     monkeypatch.chdir(tmp_path)
@@ -18,7 +18,6 @@ def worse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_report(Path("b"), {("toy", "bench"): [19.1, 19.9, 21.1, 21.9], ("kept", "bench"): BASE}, {"revision": "two"})
 
 
-@pytest.mark.usefixtures("worse")
 def test_differences_are_printed_and_written(call: Call) -> None:
     code, printed, _ = call("compare", "a", "b", "--output", "out")
     assert code == 0
@@ -29,7 +28,6 @@ def test_differences_are_printed_and_written(call: Call) -> None:
     assert row.startswith("toy,bench,bench,psnr_linear,dB,4,4,21.5,20.5,-1")
 
 
-@pytest.mark.usefixtures("worse")
 @pytest.mark.parametrize(("limit", "code"), [(0.9, 1), (1.1, 0)])
 def test_a_regression_beyond_the_limit_is_exit_code_1(call: Call, limit: float, code: int) -> None:
     ended, printed, _ = call("compare", "a", "b", "--fail-on-regression", limit)
@@ -37,7 +35,6 @@ def test_a_regression_beyond_the_limit_is_exit_code_1(call: Call, limit: float, 
     assert ("worse by more than 0.9 dB: toy on bench" in printed) == (code == 1)
 
 
-@pytest.mark.usefixtures("worse")
 def test_a_method_that_is_gone_is_a_regression(call: Call) -> None:
     write_report(Path("c"), {("kept", "bench"): BASE})
     code, printed, _ = call("compare", "a", "c", "--fail-on-regression", 9)
@@ -46,7 +43,6 @@ def test_a_method_that_is_gone_is_a_regression(call: Call) -> None:
     assert call("compare", "a", "c")[0] == 0
 
 
-@pytest.mark.usefixtures("worse")
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -63,7 +59,6 @@ def test_bad_input_is_one_line_and_exit_code_2(call: Call, arguments: tuple[str,
     assert error.count("\n") == 1
 
 
-@pytest.mark.usefixtures("worse")
 def test_equal_rows_are_counted_and_the_others_come_first(call: Call) -> None:
     better = {("fine", "bench"): [20.0, 21.0, 22.1, 23.2]}
     equal = {(f"kept {number}", "bench"): BASE for number in range(21)}

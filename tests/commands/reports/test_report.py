@@ -11,49 +11,37 @@ import pytest
 from holobench_eval.commands.reports.check import problems_in
 from holobench_eval.commands.reports.report import report
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import build_report
-from holobench_eval.study.config import load_study
-from tests.study.test_run import compute
-from tests.support.fake_study import write_config
-
-pytestmark = pytest.mark.usefixtures("no_physics")
 
 
 @pytest.fixture
-def committed(tmp_path: Path) -> tuple[Path, Path]:
+def committed(made: Path) -> tuple[Path, Path]:
     """A config, and the committed files of its report."""
-    config = write_config(tmp_path, count=2)
-    folder = tmp_path / "reports" / "study"
-    outcome = compute(config, folder)
-    build_report(load_study(config), outcome.records, folder, outcome.provenance)
-    shutil.rmtree(folder / "records")
-    return config, folder
+    shutil.rmtree(made / "records")
+    return made.parents[1] / "study.yaml", made
 
 
-def test_a_new_question_is_answered_from_the_committed_files_and_nothing_else_changes(
+def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_and_nothing_else_changes(
     committed: tuple[Path, Path],
 ) -> None:
     config, folder = committed
     before = json.loads((folder / "provenance.json").read_text())
-    tables = [(folder / name).read_bytes() for name in ("records.csv", "table.csv")]
+    records = (folder / "records.csv").read_bytes()
+    tables = (folder / "table.csv").read_bytes()
     config.write_text(f"{config.read_text()}question: What does Toy score?\n")
-    assert len(problems_in(folder.parent)[1]) == 1
+    assert len(problems_in(folder)[1]) == 1
 
     report(config, folder)
     assert "What does Toy score?" in (folder / "report.md").read_text()
     assert "(figures/answer-pictures.jpg)" in (folder / "report.md").read_text()
-    assert [(folder / name).read_bytes() for name in ("records.csv", "table.csv")] == tables
+    assert ((folder / "records.csv").read_bytes(), (folder / "table.csv").read_bytes()) == (records, tables)
     after = json.loads((folder / "provenance.json").read_text())
     assert {key for key in before if before[key] != after[key]} == {"config_sha256"}
-    assert problems_in(folder.parent)[1] == []
+    assert problems_in(folder)[1] == []
 
-
-def test_a_row_may_be_renamed_without_computing_it_again(committed: tuple[Path, Path]) -> None:
-    config, folder = committed
     config.write_text(config.read_text().replace("- plugins.py:Toy", '- {name: "plugins.py:Toy", label: Anew | <b>}'))
     report(config, folder)
     assert "| Anew \\| &lt;b>" in (folder / "report.md").read_text()
-    assert problems_in(folder.parent)[1] == []
+    assert problems_in(folder)[1] == []
 
 
 def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(committed: tuple[Path, Path]) -> None:
@@ -78,4 +66,4 @@ def test_a_report_written_again_from_committed_files_keeps_the_protocol_that_its
     assert json.loads((folder / "provenance.json").read_text())["scores"] == before
     assert (folder / "records.csv").read_bytes() == records
     assert "| metric protocol | v1 |" in (folder / "details.md").read_text()
-    assert problems_in(folder.parent)[1] == []
+    assert problems_in(folder)[1] == []

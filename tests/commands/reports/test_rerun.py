@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections import Counter
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -21,61 +20,72 @@ from holobench_eval.study.run import Outcome
 from tests.commands.test_commands import holoeval
 from tests.study.test_run import compute
 from tests.support import trained_study
-from tests.support.fake_study import solves, write_config
+from tests.support.fake_study import FAKES, solves, write_config
 
 ALL = 1000
 TWO = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: other, params: {value: 5}}')
 
 
-@dataclass(frozen=True)
 class Committed:
     """A report in ``reports/`` and the config beside that it is of."""
 
-    config: Path
-    report: Path = field(init=False)
+    def __init__(self, folder: Path) -> None:
+        self.config, self.report = folder / "study.yaml", folder / "reports" / "study"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "report", self.config.parent / "reports" / "study")
+    def commit(self, outcome: Outcome) -> None:
+        """Leave a report as it is committed: tables of a finished run, empty texts beside them, and no records."""
+        self.write(csv_text(records_frame(outcome.records, layout_of(load_study(self.config)))))
+        for name in ("report.md", "details.md"):
+            (self.report / name).touch()
+        shutil.rmtree(self.report / "records")
 
     def check(self, count: int = ALL, seed: int = 0) -> Verdict:
         artifacts = self.config.parent / "artifacts"
         return rerun(self.report, load_study(self.config), count, seed, artifacts, Serial())
 
+    def change(self, method: str, by: float) -> str:
+        """Add to the PSNR of the first cell of a method, in records.csv and in table.csv alike; return its target."""
+        frame = read_records((self.report / "records.csv").read_text())
+        first = frame.index[frame["label"] == method][0]
+        frame.loc[first, "psnr_linear_db"] = round(frame.loc[first, "psnr_linear_db"] + by, 4)
+        self.write(csv_text(frame))
+        return str(frame.loc[first, "target"])
 
-def commit(config: Path, report: Path, outcome: Outcome) -> None:
-    """Leave a report as it is committed: tables of a finished run, empty texts beside them, and no records."""
-    layout = layout_of(load_study(config))
-    text = csv_text(records_frame(outcome.records, layout))
-    _write(report, recompute_files(text, layout))
-    for name in ("report.md", "details.md"):
-        (report / name).touch()
-    shutil.rmtree(report / "records")
-
-
-def change(config: Path, report: Path, method: str, by: float) -> str:
-    """Add to the PSNR of the first cell of a method, in records.csv and in table.csv alike; return its target."""
-    path, layout = report / "records.csv", layout_of(load_study(config))
-    frame = read_records(path.read_text())
-    first = frame.index[frame["label"] == method][0]
-    frame.loc[first, "psnr_linear_db"] = round(frame.loc[first, "psnr_linear_db"] + by, 4)
-    _write(report, recompute_files(csv_text(frame), layout))
-    return str(frame.loc[first, "target"])
+    def write(self, records: str) -> None:
+        """The tables that follow from a text of records.csv."""
+        for name, text in recompute_files(records, layout_of(load_study(self.config))).items():
+            (self.report / name).write_text(text)
 
 
-def _write(report: Path, texts: dict[str, str]) -> None:
-    for name, text in texts.items():
-        (report / name).write_text(text)
-
-
-def committed(config: Path) -> Committed:
-    made = Committed(config)
-    commit(config, made.report, compute(config, made.report))
+def committed(folder: Path, *methods: str) -> Committed:
+    write_config(folder, methods, count=2)
+    made = Committed(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name, fake in FAKES:
+            patch.setattr(module, name, fake)
+        made.commit(compute(made.config, made.report))
     return made
 
 
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a report of two methods."""
+    return committed(tmp_path_factory.mktemp("toys"), *TWO).config.parent
+
+
 @pytest.fixture
-def toys(tmp_path: Path, no_physics: None) -> Committed:
-    return committed(write_config(tmp_path, TWO, count=2))
+def toys(both: Path, tmp_path: Path, no_physics: None) -> Committed:
+    """A copy of it."""
+    shutil.copytree(both, tmp_path, dirs_exist_ok=True)
+    return Committed(tmp_path)
+
+
+@pytest.fixture
+def trained(tmp_path: Path) -> Committed:
+    """A report of a method that is trained, and its artifact."""
+    made = Committed(tmp_path)
+    made.commit(trained_study.compute(trained_study.write(tmp_path), "reports/study"))
+    return made
 
 
 def test_an_untouched_report_is_reproduced_to_the_digit_and_stays_untouched(toys: Committed) -> None:
@@ -92,25 +102,24 @@ def test_a_sample_solves_no_more_than_its_cells(toys: Committed) -> None:
     assert len(solves(toys.config.parent)) == before + 2  # the third is a floor
 
 
-def test_a_number_that_was_changed_is_named(toys: Committed) -> None:
-    target = change(toys.config, toys.report, "other", 0.5)
-    (fault,) = toys.check().faults
+def test_a_number_that_was_changed_is_named_and_a_difference_between_machines_is_within_tolerance(
+    toys: Committed,
+) -> None:
+    target = toys.change("other", 0.5)
+    toys.change("Toy", 0.02)
+    verdict = toys.check()
+    (fault,) = verdict.faults
     named, _, numbers = fault.partition(" was ")
     was, now = map(float, numbers.split(", is "))
     assert named == f"other on ideal, {target}: psnr_linear [dB]"
     assert was - now == pytest.approx(0.5, abs=1e-3)
+    assert verdict.close == 1
 
 
 def test_scores_by_an_earlier_protocol_are_judged_with_a_word(toys: Committed) -> None:
     records = toys.report / "records.csv"
     records.write_text(records.read_text().replace(",v2", ",v1"))
     assert toys.check(count=2).notes == ["scores by metric protocol v1 beside those by v2 now"]
-
-
-def test_a_difference_between_machines_is_within_tolerance(toys: Committed) -> None:
-    change(toys.config, toys.report, "other", 0.02)
-    verdict = toys.check()
-    assert (verdict.close, verdict.faults) == (1, [])
 
 
 def test_a_method_that_makes_other_phases_is_found(toys: Committed) -> None:
@@ -136,60 +145,37 @@ def test_a_method_that_fails_now_is_found(toys: Committed) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_method_that_follows_others_is_named_and_not_rerun(tmp_path: Path) -> None:
+def test_what_cannot_be_rerun_is_named_or_counted(tmp_path: Path) -> None:
+    failing = '{name: "plugins.py:Toy", params: {fail: "no light"}}'
     following = '{name: "plugins.py:Following", label: oracle}'
-    verdict = committed(write_config(tmp_path, (*TWO, following), count=2)).check()
-    assert verdict.cells == 2 * 6 + 2 * 2
+    made = committed(tmp_path, failing, TWO[1], following)
+    made.config.write_text(made.config.read_text().replace("label: other", "label: renamed"))
+    verdict = made.check()
+    assert verdict.cells == 2 * 6 + 1
     assert verdict.notes == [
-        "not rerun: oracle (2 cells): starts from the phases of all other methods, which records.csv has not"
+        "not rerun: 2 rows of records.csv that the config does not plan",
+        "not rerun: 1 row of records.csv without a score",
+        "not rerun: oracle (2 cells): starts from the phases of all other methods, which records.csv has not",
     ]
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_a_row_that_the_config_does_not_plan_is_counted(toys: Committed) -> None:
-    toys.config.write_text(toys.config.read_text().replace("label: other", "label: renamed"))
-    verdict = toys.check()
-    assert verdict.notes == ["not rerun: 2 rows of records.csv that the config does not plan"]
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_row_without_a_score_is_counted(tmp_path: Path) -> None:
-    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no light"}}',), count=2)
-    assert committed(config).check().notes == ["not rerun: 1 row of records.csv without a score"]
-
-
-def test_a_trained_method_needs_its_artifact(tmp_path: Path) -> None:
-    made = Committed(trained_study.write(tmp_path))
-    outcome = trained_study.compute(made.config, "reports/study")
-    commit(made.config, made.report, outcome)
-    assert made.check().faults == []
-    shutil.rmtree(tmp_path / "artifacts")
-    verdict = made.check()
-    assert verdict.cells == 5
-    (note,) = verdict.notes
-    assert note.startswith("not rerun: Gain (1 cell): needs training of ")
-    assert not (tmp_path / "artifacts").exists()
-
-
-def test_an_artifact_of_another_training_is_found(tmp_path: Path) -> None:
-    made = Committed(trained_study.write(tmp_path))
-    commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
-    path, artifact = made.report / "records.csv", trained_study.artifact_of(made.config)
-    sha256 = json.loads((artifact / "provenance.json").read_text())["sha256"]
-    path.write_text(path.read_text().replace(sha256, "f" * 64))
-    (fault,) = made.check().faults
+def test_a_trained_method_needs_the_artifact_of_its_training(trained: Committed) -> None:
+    assert trained.check().faults == []
+    path, artifact = trained.report / "records.csv", trained_study.artifact_of(trained.config)
+    text, sha256 = path.read_text(), json.loads((artifact / "provenance.json").read_text())["sha256"]
+    path.write_text(text.replace(sha256, "f" * 64))
+    (fault,) = trained.check().faults
     assert fault.endswith(f"learned state was ffffffffffff, is {sha256[:12]}: another artifact")
 
-
-def test_the_length_of_a_training_is_as_it_was(tmp_path: Path) -> None:
-    made = Committed(trained_study.write(tmp_path))
-    commit(made.config, made.report, trained_study.compute(made.config, "reports/study"))
-    path = made.report / "records.csv"
-    frame = read_records(path.read_text())
+    frame = read_records(text)
     frame.loc[frame["label"] == "Gain", "training_s"] = 610
     path.write_text(csv_text(frame))
-    shutil.rmtree(trained_study.artifact_of(made.config))
-    assert "Gain (1 cell): needs training of about 10 min" in made.check().notes[0]
+    shutil.rmtree(artifact.parent)
+    verdict = trained.check()
+    assert verdict.cells == 5
+    (note,) = verdict.notes
+    assert note.startswith("not rerun: Gain (1 cell): needs training of about 10 min")
+    assert not artifact.parent.exists()
 
 
 def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path: Path) -> None:
@@ -225,7 +211,7 @@ def test_the_command_says_what_it_found(
 ) -> None:
     monkeypatch.setattr(executors, "executor", lambda *_: Serial())
     monkeypatch.chdir(toys.config.parent)
-    change(toys.config, toys.report, "Toy", by)
+    toys.change("Toy", by)
     assert holoeval(monkeypatch, "check", "--rerun", ALL) == code
     shown = capsys.readouterr().out
     assert "reports/study: 16 cells computed again" in shown

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from holobench_eval.commands.show import effects as listed
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import names
@@ -17,12 +15,9 @@ def found(name: str) -> set[str]:
     return {one.name for one in load_profile(name).effects()}
 
 
-def test_an_ideal_display_has_its_levels_alone() -> None:
-    assert found("ideal") == {"quantisation"}
-
-
 def test_an_effect_is_listed_when_it_is_switched_on() -> None:
     ideal = load_profile("ideal")
+    assert found("ideal") == {"quantisation"}
     flickering = {one.name: one.text for one in replace(ideal, flicker=Flicker(0.02)).effects()}
     assert flickering.keys() - {"quantisation"} == {"flicker"}
     assert "2 %" in flickering["flicker"]
@@ -43,15 +38,11 @@ def test_uneven_effects_are_outside_the_form_of_the_model() -> None:
     assert more.isdisjoint(FORM)
 
 
-def test_a_form_names_only_effects_that_some_display_has_or_may_have() -> None:
-    everywhere = set().union(*map(found, names()))
+def test_no_effect_is_listed_twice_and_a_form_names_only_those_that_some_display_has_or_may_have() -> None:
+    told = [[one.name for one in load_profile(name).effects()] for name in names()]
+    assert all(len(effects) == len(set(effects)) for effects in told)
+    everywhere = set().union(*told)
     assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical"}
-
-
-@pytest.mark.parametrize("name", names())
-def test_no_effect_is_listed_twice(name: str) -> None:
-    told = [one.name for one in load_profile(name).effects()]
-    assert len(told) == len(set(told))
 
 
 def test_the_form_of_the_model_is_wrong_for_leto_aged_and_more_so_for_the_dusty_one() -> None:
@@ -60,9 +51,6 @@ def test_the_form_of_the_model_is_wrong_for_leto_aged_and_more_so_for_the_dusty_
         assert {"sub_pixel_field", "pixel_aperture", "flicker", "plane_dust", "roughness", "noise"} <= lacking
         assert {"look_up_table", "crosstalk", "zero_order", "defocus", "coma_x"}.isdisjoint(lacking)
     assert "trefoil_y" in {effect for effect, _, modelled in listed("leto-dusty") if not modelled}
-
-
-def test_the_model_meets_a_blaze_and_stray_light_and_lacks_the_spectrum() -> None:
     lacking = {effect for effect, _, modelled in listed("leto-2020") if not modelled}
     assert "spectrum" in lacking
     assert {"blaze", "stray_light"}.isdisjoint(lacking)

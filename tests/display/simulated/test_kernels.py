@@ -61,7 +61,7 @@ def test_a_phase_that_is_no_number_stays_none(phase):
     assert bool(field[:, :, 60:].isfinite().all())
 
 
-@pytest.mark.parametrize("name", ["leto-aged", "pluto-offaxis", "ideal"])
+@pytest.mark.parametrize("name", ["leto-aged", "pluto-offaxis"])
 def test_intensity_without_a_gradient_is_that_with_one(name, phase):
     bench = SimulatedBench(load_profile(name).scaled(PANEL))
     fast = bench.integrated(phase[1], 1)
@@ -69,7 +69,7 @@ def test_intensity_without_a_gradient_is_that_with_one(name, phase):
     assert float((fast - slow).norm() / slow.norm()) < 1e-6
 
 
-@pytest.mark.parametrize("width", [1.16, 2.9, 4.0])
+@pytest.mark.parametrize("width", [1.16, 4.0])
 @pytest.mark.parametrize("size", [2**30, 1000])
 def test_the_area_of_a_pixel_and_its_gradient_are_those_of_torch(width, size, monkeypatch):
     monkeypatch.setattr(blocks, "BLOCK_BYTES", size)

@@ -25,7 +25,7 @@ def path(samples, finer, dust, clean=()):
 
 @pytest.mark.parametrize("dust", [False, True])
 @pytest.mark.parametrize("clean", [[], [0, 4, 5]])
-@pytest.mark.parametrize(("samples", "finer"), [(1, 1), (3, 2), (2, 1)])
+@pytest.mark.parametrize(("samples", "finer"), [(1, 1), (3, 2)])
 def test_the_adjoint_passes_the_dot_product_test(samples, finer, dust, clean):
     torch.manual_seed(0)
     one = path(samples, finer, dust, clean)

@@ -1,7 +1,7 @@
 from importlib.resources import files
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holobench_eval.core.errors import UserError
@@ -12,10 +12,7 @@ from holobench_eval.optics.padding import spread
 PROFILES = files("holobench_eval.display.simulated") / "profiles"
 
 
-def test_the_promised_profiles_are_there():
-    assert {"ideal", "leto-mild", "leto-aged", "plm-4bit", "pluto-offaxis"} <= set(names())
-
-
+@settings(max_examples=40)
 @given(rows=st.integers(64, 700), columns=st.integers(64, 1200), name=st.sampled_from(names()))
 def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
     full, small = load_profile(name).spec(), load_profile(name).spec((rows, columns))
@@ -26,15 +23,12 @@ def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
     assert small.region.top * 2 + small.region.height in (rows, rows - 1)
 
 
-def test_no_panel_is_larger_than_the_display():
+def test_no_panel_is_larger_than_the_display_and_scaling_is_said():
+    assert "full panel" in load_profile("ideal").scaling_note(None)
+    assert "the distance goes from 100 to 23.7 mm" in load_profile("ideal").scaling_note((256, 256))
     profile = load_profile("leto-aged").scaled((100, 120))
     assert profile.scaled((300, 110)).panel.shape == (100, 110)
     assert profile.scaled((300, 110)).panel.distance == profile.panel.distance
-
-
-def test_scaling_is_said():
-    assert "full panel" in load_profile("ideal").scaling_note(None)
-    assert "the distance goes from 100 to 23.7 mm" in load_profile("ideal").scaling_note((256, 256))
 
 
 def test_digest_follows_the_file(tmp_path):
@@ -49,19 +43,14 @@ def test_digest_follows_the_file(tmp_path):
     ("change", "message"),
     [
         (("bits: 8", "bits: many"), r"mine.yaml:\d+:\d+: panel.bits should be a whole number"),
-        (("bits: 8", "bits: 99"), r"mine.yaml:\d+:\d+: panel.bits"),
         (("sensor:", "sensro:"), r"mine.yaml:\d+:1: unknown key 'sensro'.*did you mean 'sensor'"),
-        (("pitch: 6.4e-6", "pitch: -1"), r"mine.yaml:\d+:\d+: panel.pitch: -1 is not in 500e-9 to 200e-6 m$"),
         (("pitch: 6.4e-6", "pitch: 6.4"), r"panel.pitch: 6.4 is not in .* m; lengths are in metres: 6.4e-6$"),
-        (("distance: 0.1 ", "distance: 100 "), r"panel.distance: 100 is not in .* m; lengths are in metres: 100e-3$"),
         (("6.36e-7, 5.17e-7, 4.46e-7", "532"), r"wavelengths\[0\]: 532 is not in .*; lengths are in metres: 532e-9$"),
         ((", 4.46e-7]", "]"), r"panel.wavelengths: 2 wavelengths; a display has three, .* or one, for gray pictures$"),
-        ((", 4.46e-7]", ", 4e-7, 3e-7]"), r"panel.wavelengths: 4 wavelengths; a display has three"),
         (("5.17e-7, 4.46e-7]", "4.46e-7, 5.17e-7]"), r"red comes first, .*: \[6.36e-07, 5.17e-07, 4.46e-07\]$"),
         (("version: 1\n", ""), "missing key 'version'"),
         (("", "lut: {bend: 0.25}\n"), ":4:13: 0.25 bends some exponents to zero"),
         (("", "spectrum: {measured: [[[0, 1]]]}\n"), ":4:22: there are 1 measured spectra; the panel has 3"),
-        (("", "spectrum: {measured: [[[-7e-7, 1]]]}\n"), r":4:2.: spectrum\.measured\[0\].* should be .* than"),
         (("", "spectrum: {width: [1e-3, 0, 0]}\n"), r":4:2.: spectrum\.width\[0\].* should be .* than or equal to"),
     ],
 )
@@ -76,24 +65,14 @@ def test_a_fault_in_a_profile_is_one_line_with_its_place(tmp_path, change, messa
     assert "\n" not in str(caught.value)
 
 
-def test_unknown_profile_suggests_the_nearest():
+def test_an_unknown_profile_and_a_panel_that_cannot_be_are_refused():
     with pytest.raises(UserError, match="did you mean 'leto-aged'"):
         load_profile("leto-agde")
     with pytest.raises(UserError, match="no such file"):
         load_profile("none.yaml")
-
-
-@pytest.mark.parametrize("shape", [(10, 10), (64, 100000)])
-def test_panel_that_cannot_be_is_refused(shape):
-    with pytest.raises(UserError, match="64 to 8192"):
-        load_profile("ideal").spec(shape)
-
-
-def test_table_must_have_an_entry_for_every_level(tmp_path):
-    text = (PROFILES / "plm-4bit.yaml").read_text()
-    (tmp_path / "mine.yaml").write_text(text.replace("bits: 4", "bits: 5"))
-    with pytest.raises(UserError, match="16 entries; a panel of 5 bits has 32"):
-        load_profile("mine.yaml", tmp_path)
+    for shape in ((10, 10), (64, 100000)):
+        with pytest.raises(UserError, match="64 to 8192"):
+            load_profile("ideal").spec(shape)
 
 
 def test_a_profile_like_another_has_its_values_where_it_gives_none(tmp_path):
@@ -126,7 +105,7 @@ def test_a_profile_like_none_or_like_itself_is_refused(tmp_path, text, message):
     [
         ("like: ideal\ncrosstalk: {widht: 3}\n", r"/base.yaml:2:13: unknown key 'widht'"),
         ("like: ideal\ncrosstalk: {width: wide}\n", r"/base.yaml:2:20: crosstalk.width"),
-        ("like: plm-4bit\npanel: {bits: 5}\n", r"/base.yaml:\d+:\d+: the table has 16 entries"),
+        ("like: plm-4bit\npanel: {bits: 5}\n", r"/base.yaml:\d+:\d+: .*16 entries; a panel of 5 bits has 32"),
     ],
 )
 def test_a_fault_of_a_base_is_told_of_the_file_that_has_it(tmp_path, base, place):

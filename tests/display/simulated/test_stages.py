@@ -20,9 +20,7 @@ from holobench_eval.display.simulated.stages import (
     Propagation,
     Relay,
     Sensor,
-    ZeroOrder,
 )
-from holobench_eval.display.simulated.stages.crosstalk import sample_positions
 from holobench_eval.display.simulated.stages.panel import straight_through_level
 from holobench_eval.display.simulated.stages.relay import sample, sampling_grid
 from holobench_eval.display.simulated.stages.sensor import box_filter
@@ -45,21 +43,14 @@ def test_linear_table_gives_the_nominal_phase(geometry):
     assert torch.allclose(table.gain_map(geometry), torch.ones(geometry.shape))
 
 
-def test_gamma_and_gain_bend_and_shorten_the_stroke():
-    curve = LookUpTable(gamma=(1.2, 1.2, 1.2), gain=(0.9, 0.9, 0.9)).curve(8, 0)
-    assert float(curve[128]) == pytest.approx(0.9 * TAU * 0.5**1.2, rel=1e-5)
-    assert float(curve[255]) < 0.9 * TAU
-
-
-def test_published_table_gives_its_percentages():
+def test_a_table_has_its_gamma_and_gain_or_its_published_percentages_and_no_other_length():
+    bent = LookUpTable(gamma=(1.2, 1.2, 1.2), gain=(0.9, 0.9, 0.9)).curve(8, 0)
+    assert float(bent[128]) == pytest.approx(0.9 * TAU * 0.5**1.2, rel=1e-5)
     percent = (0.0, 10.0, 40.0, 100.0)
     curve = LookUpTable(table=percent).curve(2, 0)
     assert torch.allclose(curve, torch.tensor(percent) / 100 * TAU * 3 / 4)
-
-
-def test_table_of_the_wrong_length_is_refused():
     with pytest.raises(ValueError, match="entries"):
-        LookUpTable(table=(0.0, 100.0)).curve(4, 0)
+        LookUpTable(table=percent).curve(4, 0)
 
 
 @settings(max_examples=20, deadline=None)
@@ -70,7 +61,9 @@ def test_crosstalk_keeps_a_constant_phase(width, samples):
     assert torch.allclose(stage.apply(phase, stage.weights(samples)), torch.full((samples**2, 12, 16), 2.5), atol=1e-5)
 
 
-def test_crosstalk_turns_a_wrap_edge_into_a_ramp():
+def test_crosstalk_turns_a_wrap_edge_into_a_ramp_and_none_keeps_pixels_apart():
+    phase, none = torch.rand(8, 8), Crosstalk(0.0)
+    assert torch.allclose(none.apply(phase, none.weights(3)), phase.expand(9, 8, 8), atol=1e-6)
     phase = torch.zeros(9, 16)
     phase[:, 8:] = TAU
     stage = Crosstalk(0.45)
@@ -99,36 +92,18 @@ def test_an_uneven_table_bends_as_much_as_stated_and_only_where_it_is_said(geome
     assert torch.allclose(shown, TAU * 0.25 ** (1.1 + bend), atol=1e-4)
 
 
-def test_no_crosstalk_keeps_pixels_apart():
-    stage = Crosstalk(0.0)
-    phase = torch.rand(8, 8)
-    assert torch.allclose(stage.apply(phase, stage.weights(3)), phase.expand(9, 8, 8), atol=1e-6)
-
-
 @given(st.floats(0.1, 1.0), st.integers(1, 7))
-def test_active_shares_add_up_to_the_fill_factor(fill, samples):
+def test_active_shares_add_up_to_the_fill_factor_and_dead_area_reflects_the_rest(fill, samples):
     assert float(PixelAperture(fill).active_share(samples).mean()) == pytest.approx(fill, abs=1e-5)
+    dead = PixelAperture(fill, dead_amplitude=0.4).dead_share(samples)
+    assert float(dead.mean()) == pytest.approx(0.4 * (1 - fill), abs=1e-5)
 
 
-def test_dead_area_reflects_without_modulation():
-    aperture = PixelAperture(fill=0.5, dead_amplitude=0.4)
-    assert float(aperture.active_share(1)) == pytest.approx(0.5)
-    assert float(aperture.dead_share(1)) == pytest.approx(0.5 * 0.4)
-
-
-def test_samples_sit_symmetrically_in_their_pixel():
-    assert sample_positions(1) == [0.0]
-    assert sample_positions(3) == pytest.approx([-1 / 3, 0, 1 / 3])
-
-
-def test_flicker_has_its_rms():
+def test_flicker_and_the_ripple_within_a_frame_have_their_rms():
     draw = torch.Generator().manual_seed(0)
     gains = torch.tensor([Flicker(0.05).gain(draw) for _ in range(2000)])
     assert float(gains.std()) == pytest.approx(0.05, rel=0.1)
     assert Flicker().gain(draw) == 1.0
-
-
-def test_the_moments_of_a_frame_have_the_rms_of_its_ripple():
     assert Flicker(0.05).moments == (1.0,)
     assert torch.tensor(Flicker(ripple=0.03).moments).std(correction=0) == pytest.approx(0.03)
 
@@ -145,7 +120,7 @@ def test_fringes_modulate_by_what_they_say(geometry):
     assert 0.10 < float(amplitude.max() - amplitude.min()) <= 0.17
 
 
-def test_dirt_only_absorbs(geometry):
+def test_dirt_only_absorbs_and_roughness_has_its_rms(geometry):
     dirty = CoherentNoise(specks=20, scratches=2, plane_specks=5)
     panel, plane = dirty.panel(geometry).abs(), dirty.plane(geometry).abs()
     for transmission in (panel, plane):
@@ -153,9 +128,6 @@ def test_dirt_only_absorbs(geometry):
         assert float(transmission.max()) <= 1 + 1e-6
         assert float((transmission < 0.99).float().mean()) < 0.2
     assert CoherentNoise().plane(geometry) is None
-
-
-def test_roughness_has_its_rms(geometry):
     rough = CoherentNoise(roughness=0.1).panel(geometry).angle()
     assert float(rough.square().mean().sqrt()) == pytest.approx(0.1, rel=0.01)
 
@@ -183,21 +155,13 @@ def test_two_legs_of_the_way_are_the_way(geometry):
     assert torch.allclose(whole, legs, atol=1e-4)
 
 
-def test_zero_order_splits_the_power():
-    stage = ZeroOrder(0.2, 0.3)
-    assert stage.modulated**2 + abs(stage.unmodulated) ** 2 == pytest.approx(1)
-
-
-def test_straight_relay_samples_the_panel_at_its_pixels():
+def test_straight_relay_samples_the_panel_at_its_pixels_and_turns_by_its_angle():
     points = Relay().panel_points((64, 96), 6.4e-6, 3.2e-6)
     step = points[1, 0] - points[0, 0]
     assert torch.allclose(step, torch.tensor([0.5, 0.0], dtype=torch.float64))
     assert torch.allclose(points.mean((0, 1)), torch.tensor([31.5, 47.5], dtype=torch.float64), atol=1e-9)
-
-
-def test_relay_turns_by_its_angle():
-    points = Relay(rotation=90).panel_points((64, 64), 6.4e-6, 6.4e-6)
-    along = points[10, 40] - points[10, 39]
+    turned = Relay(rotation=90).panel_points((64, 64), 6.4e-6, 6.4e-6)
+    along = turned[10, 40] - turned[10, 39]
     assert torch.allclose(along, torch.tensor([-1.0, 0.0], dtype=torch.float64), atol=1e-9)
 
 
@@ -219,11 +183,13 @@ def test_pixel_area_keeps_a_constant_and_has_its_width(width):
     assert float(box_filter(point, width).sum()) == pytest.approx(1, abs=1e-5)
 
 
-def test_counts_of_an_ideal_camera_are_the_light(geometry):
+def test_counts_of_an_ideal_camera_are_the_light_up_to_the_white_level():
     sensor = Sensor(noise=False, dark=100)
     light = torch.rand(8, 8)
     counts = sensor.expose(light, 1000.0, torch.ones(8, 8), torch.zeros(8, 8))
     assert torch.allclose((counts - 100) / (1000 * sensor.counts_per_electron), light, atol=1e-4)
+    counts = Sensor(bits=12).expose(9 + light, Sensor().full_well, torch.ones(8, 8), torch.zeros(8, 8))
+    assert torch.all(counts == 4095)
 
 
 def test_shot_and_read_noise_have_their_variance():
@@ -232,12 +198,6 @@ def test_shot_and_read_noise_have_their_variance():
     electrons = (counts - 500) / sensor.counts_per_electron
     assert float(electrons.mean()) == pytest.approx(5000, rel=1e-3)
     assert float(electrons.var()) == pytest.approx(5000 + 100, rel=0.03)
-
-
-def test_bright_light_saturates_at_the_white_level():
-    sensor = Sensor(bits=12)
-    counts = sensor.expose(torch.full((4, 4), 9.0), sensor.full_well, torch.ones(4, 4), torch.zeros(4, 4))
-    assert torch.all(counts == 4095)
 
 
 def test_vignetting_darkens_the_corner(geometry):

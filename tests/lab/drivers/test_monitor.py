@@ -42,18 +42,12 @@ def every_level() -> np.ndarray:
     return ((rows * 7 + columns * 5 + (rows * columns) % 3) % 256).astype(np.uint8)
 
 
-def test_every_level_of_every_pixel_is_what_another_program_sees(slm: MonitorSlm, eyes: Eyes) -> None:
+def test_every_level_of_every_pixel_is_at_once_what_another_program_sees(slm: MonitorSlm, eyes: Eyes) -> None:
     levels = every_level()
     assert np.array_equal(np.unique(levels), np.arange(256))
-    slm.show(levels)
-    assert np.array_equal(eyes.panel(), np.repeat(levels[..., None], 3, axis=2))
-
-
-def test_a_new_picture_replaces_the_old_one_at_once(slm: MonitorSlm, eyes: Eyes) -> None:
-    noise = np.random.default_rng(1).integers(0, 256, (3, *SHAPE), dtype=np.uint8)
-    for levels in noise:
-        slm.show(levels)
-        assert np.array_equal(eyes.panel()[..., 1], levels)
+    for picture in (levels, np.random.default_rng(1).integers(0, 256, SHAPE, dtype=np.uint8)):
+        slm.show(picture)
+        assert np.array_equal(eyes.panel(), np.repeat(picture[..., None], 3, axis=2))
 
 
 def test_the_pointer_may_leave_the_panel_and_is_invisible_on_it_while_the_picture_stays(
@@ -68,7 +62,7 @@ def test_the_pointer_may_leave_the_panel_and_is_invisible_on_it_while_the_pictur
     assert np.array_equal(eyes.panel()[..., 0], levels)
 
 
-def test_a_notice_in_front_of_the_panel_is_told(slm: MonitorSlm, eyes: Eyes) -> None:
+def test_a_notice_in_front_of_the_panel_and_a_bent_gamma_curve_are_told(slm: MonitorSlm, eyes: Eyes) -> None:
     levels = every_level()
     with (
         eyes.notice(),
@@ -76,10 +70,6 @@ def test_a_notice_in_front_of_the_panel_is_told(slm: MonitorSlm, eyes: Eyes) -> 
     ):
         slm.show(levels)
     slm.show(levels)
-
-
-def test_a_bent_gamma_curve_is_told(slm: MonitorSlm, eyes: Eyes) -> None:
-    levels = every_level()
     with eyes.bent_curve(), pytest.raises(DeviceError, match="gamma curve is bent"):
         slm.show(levels)
     slm.show(levels)
@@ -94,12 +84,9 @@ def test_levels_of_another_shape_or_type_are_never_converted(slm: MonitorSlm) ->
 
 @pytest.mark.parametrize("asked", [{"name": "HDMI-1"}, {"resolution": (1024, 768)}])
 def test_another_name_or_resolution_is_refused_with_what_was_found(desktop: str, asked: dict) -> None:
+    assert list_monitors() == ["DUMMY0 1024x768", "DUMMY1 1920x1080"]
     with pytest.raises(UserError, match=r"no monitor '.*'; found: DUMMY0 1024x768, DUMMY1 1920x1080"):
         MonitorSlm(MonitorSettings(**{**PANEL, **asked}))
-
-
-def test_monitors_are_listed(desktop: str) -> None:
-    assert list_monitors() == ["DUMMY0 1024x768", "DUMMY1 1920x1080"]
 
 
 def test_two_monitors_of_the_same_name_are_refused() -> None:

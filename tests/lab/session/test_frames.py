@@ -19,6 +19,7 @@ def test_sixteen_bits_come_back_as_they_were_counted(tmp_path, counts, ending):
     path = tmp_path / f"0001{ending}"
     Image.fromarray(counts).save(path)
     frame = read_frame(find(tmp_path, "0001"), colour=0)
+    assert find(tmp_path, "0002") is None
     assert np.array_equal(frame.counts, counts)
     assert frame.linear
     assert frame.top == 65535
@@ -56,7 +57,7 @@ def test_a_jpeg_is_decoded_and_called_not_linear(tmp_path):
 def test_what_is_no_photograph_is_one_line(tmp_path):
     (tmp_path / "text.png").write_text("not a picture")
     Image.new("RGBA", (8, 8)).save(tmp_path / "alpha.png")
-    Image.new("L", (20_000, 20_000)).save(tmp_path / "huge.png")
+    Image.new("L", (14_200, 14_200)).save(tmp_path / "huge.png")
     frames = [Image.new("L", (8, 8), value) for value in (1, 2)]
     frames[0].save(tmp_path / "many.tif", save_all=True, append_images=frames[1:])
     for name, line in (
@@ -70,12 +71,11 @@ def test_what_is_no_photograph_is_one_line(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-def test_two_files_for_one_photograph_are_refused_and_none_is_none(tmp_path):
+def test_two_files_for_one_photograph_are_refused(tmp_path):
     for ending in (".png", ".tif"):
         Image.new("L", (8, 8)).save(tmp_path / f"0001{ending}")
     with pytest.raises(UserError, match="keep one of these"):
         find(tmp_path, "0001")
-    assert find(tmp_path, "0002") is None
 
 
 def test_a_tiff_without_its_size_is_one_line(tmp_path, counts):

@@ -1,6 +1,8 @@
 """A manifest may come from anywhere: what is not exactly ours is refused in one line, and no path in it is followed."""
 
+import functools
 import json
+import operator
 from dataclasses import replace
 
 import pytest
@@ -23,32 +25,23 @@ PATTERN = Pattern(1, 1, "hologram", 0, 1.0, HEX, HEX, file_of(1, 1), capture_of(
 MANIFEST = Manifest(1, HEX, HEX, HEX, "bench", (128, 160), (5.2e-7,), Convention(sign=-1), False, (PATTERN,))
 
 
-def test_a_manifest_comes_back_as_it_was_written(tmp_path):
-    write_manifest(tmp_path, MANIFEST)
-    assert read_manifest(tmp_path) == MANIFEST
-
-
-def change(path, keys, value):
-    content = json.loads(path.read_text())
-    place = content
-    for key in keys[:-1]:
-        place = place[key]
-    place[keys[-1]] = value
-    path.write_text(json.dumps(content))
+def test_a_manifest_comes_back_as_it_was_written_with_its_rounds(tmp_path):
+    second = replace(PATTERN, round=2, file=file_of(2, 1), capture=capture_of(2, 1))
+    both = replace(MANIFEST, patterns=(PATTERN, second))
+    write_manifest(tmp_path, both)
+    assert read_manifest(tmp_path) == both
+    assert (both.rounds, both.of_round(2)) == (2, [second])
 
 
 @pytest.mark.parametrize(
     ("keys", "value", "line"),
     [
         (("patterns", 0, "file"), "/etc/passwd", "should be 'patterns/round-1/0001.png'"),
-        (("patterns", 0, "file"), "patterns/../../secret.png", "should be"),
         (("patterns", 0, "capture"), "../elsewhere/0001", "should be 'captures/round-1/0001'"),
-        (("patterns", 0, "capture"), 7, "valid string"),
         (("patterns", 0, "number"), 2, "stands after"),
         (("patterns", 0, "round"), 10**9, "less than or equal"),
         (("patterns", 0, "exposure"), float("nan"), "NaN"),
         (("patterns", 0, "exposure"), 1e300, "less than"),
-        (("patterns", 0, "exposure"), -1.0, "greater than"),
         (("patterns", 0, "role"), "script", "hologram"),
         (("patterns", 0, "key"), "x", "at least 64"),
         (("patterns",), {"a": 1}, "unknown key 'a' in patterns"),
@@ -57,7 +50,6 @@ def change(path, keys, value):
         (("panel",), [10**9, 10**9], "less than or equal"),
         (("panel",), [128], "panel has too few values: .128."),
         (("wavelengths",), [], "at least 1"),
-        (("wavelengths",), ["green"], "valid number"),
         (("phase", "two_pi_level"), 0, "0 is no level of a full turn"),
         (("format",), 2, "format"),
         (("session",), None, "valid string"),
@@ -66,7 +58,9 @@ def change(path, keys, value):
 )
 def test_a_hostile_manifest_is_refused_in_one_line(tmp_path, keys, value, line):
     write_manifest(tmp_path, MANIFEST)
-    change(tmp_path / "manifest.json", keys, value)
+    content = json.loads((tmp_path / "manifest.json").read_text())
+    functools.reduce(operator.getitem, keys[:-1], content)[keys[-1]] = value
+    (tmp_path / "manifest.json").write_text(json.dumps(content))
     with pytest.raises(UserError, match=line) as caught:
         read_manifest(tmp_path)
     assert "\n" not in str(caught.value)
@@ -92,15 +86,13 @@ def test_a_manifest_that_is_a_link_or_missing_is_refused(tmp_path):
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path):
-    session, secret = tmp_path / "session", tmp_path / "secret.png"
-    secret.write_bytes(b"secret")
-    (session / "captures" / "round-1").mkdir(parents=True)
-    (session / "captures" / "round-1" / "0001.png").symlink_to(secret)
-    with pytest.raises(UserError, match="leads out of the session folder"):
-        inside(session, "captures/round-1/0001.png")
+    session = tmp_path / "session"
+    (session / "captures").mkdir(parents=True)
+    (session / "captures" / "0001.png").symlink_to(tmp_path / "secret.png")
     (session / "patterns").symlink_to(tmp_path)
-    with pytest.raises(UserError, match="leads out"):
-        inside(session, "patterns/round-1/0001.png")
+    for name in ("captures/0001.png", "patterns/0001.png"):
+        with pytest.raises(UserError, match="leads out of the session folder"):
+            inside(session, name)
 
 
 @pytest.mark.parametrize("name", ["report", "report/records", "captures", "study.yaml", "artifacts/one/learned.pt"])
@@ -114,10 +106,3 @@ def test_no_link_anywhere_in_a_session_leads_out_of_it(tmp_path, name):
     (session / name).unlink()
     (session / "inner").symlink_to(session)
     refuse_links_out(session)
-
-
-def test_rounds_follow_each_other():
-    second = replace(PATTERN, round=2, file=file_of(2, 1), capture=capture_of(2, 1))
-    both = replace(MANIFEST, patterns=(PATTERN, second))
-    assert both.rounds == 2
-    assert both.of_round(2) == [second]

@@ -20,9 +20,9 @@ from tests.support.photographing import Lab
 
 STUDY = """\
 title: Seen two ways
-display: {profiles: [leto-mild], panel: [256, 256]}
-targets: {dataset: photographs, params: {count: 2}}
-methods: [{name: wirtinger, params: {iterations: 60}}]
+display: {profiles: [leto-mild], panel: [208, 208]}
+targets: {dataset: photographs, params: {count: 1}}
+methods: [{name: wirtinger, params: {iterations: 20}}]
 protocol: {metrics: [psnr, ssim]}
 """
 
@@ -54,7 +54,7 @@ def test_import_and_score_give_the_same_number_for_the_same_photographs(tmp_path
     session = tmp_path / "bench"
     (tmp_path / "study.yaml").write_text(STUDY)
     run("session", "export", tmp_path / "study.yaml", session)
-    Lab("leto-mild", (256, 256), seed=1).photograph_round(session, 1)
+    Lab("leto-mild", (208, 208), seed=1).photograph_round(session, 1)
     run("session", "import", session)
     lay_out(session, tmp_path)
     pictures = ("--captures", tmp_path / "captures", "--targets", tmp_path / "targets")

@@ -27,7 +27,7 @@ def refused(folder: Path, profile: str, lab: Lab) -> str:
     return told("import", session)[1]
 
 
-@pytest.mark.parametrize("profile", ["leto-mild", "leto-aged"])
+@pytest.mark.parametrize("profile", ["leto-mild", "leto-aged"])  # without and with a ghost of the grid
 def test_photographs_of_the_conjugate_pattern_name_the_sign(tmp_path: Path, profile: str) -> None:
     line = refused(tmp_path, profile, Lab(profile, (144, 144), seed=3, sign=-1))
     assert "the likely cause is the sign of the phase" in line

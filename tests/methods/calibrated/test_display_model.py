@@ -6,27 +6,19 @@ import copy
 import math
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from holobench_eval.display import load_profile
-from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
-from holobench_eval.display.simulated.pipeline import SimulatedBench
-from holobench_eval.display.simulated.stages import LookUpTable, ZeroOrder
+from holobench_eval.display.api import DisplaySpec, Region
 from holobench_eval.methods.calibrated.display_model import KNOTS, MODES, DisplayModel
-from holobench_eval.methods.hil.plus import HILPlus
-from holobench_eval.methods.learned.samples import Sample
-from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.optics import AngularSpectrum
 from holobench_eval.optics.phasor import squared_modulus
 
 TAU = 2 * math.pi
 NO_CROSSTALK = -20.0
-STEPS = 375
 
 
 def spec_of(size: int = 48, margin: int = 4, distance: float = 4e-3, pupil: float | None = None) -> DisplaySpec:
@@ -101,21 +93,6 @@ def test_a_neutral_model_dims_a_ramp_by_the_mean_over_its_three_blurred_samples(
     assert torch.allclose(field, factor * spec.region.crop(on_panel(phase)), atol=1e-5)
 
 
-def test_a_neutral_model_is_close_to_the_ideal_display_for_a_smooth_phase() -> None:
-    spec = spec_of()
-    phase = smooth_phase(spec)
-    with torch.no_grad():
-        field, expected = DisplayModel(spec)(phase), ideal(spec, on_panel(phase))
-    assert (field - expected).norm() < 0.02 * expected.norm()
-
-
-def test_a_phase_counts_modulo_a_turn() -> None:
-    spec = spec_of()
-    model, phase = DisplayModel(spec), smooth_phase(spec)
-    with torch.no_grad():
-        assert torch.allclose(model(phase + 3 * TAU), model(phase), atol=1e-3)
-
-
 @pytest.mark.parametrize("knot", [0, 5, KNOTS - 1])
 def test_the_table_moves_the_driven_phase_around_its_knot_alone(knot: int) -> None:
     spec = spec_of(distance=0.0)
@@ -165,27 +142,6 @@ def test_crosstalk_turns_a_wrap_edge_into_a_ramp_as_wide_as_it_says() -> None:
             assert float(row[middle + pixel]) == pytest.approx(float(step.mean()), abs=5e-3)
 
 
-def test_a_blurred_wrap_loses_light() -> None:
-    spec = spec_of(distance=0.0)
-    phase = torch.full((2, *spec.shape), 0.01)
-    phase[:, :, 24:] = -0.01
-    with torch.no_grad():
-        intensity = intensity_of(DisplayModel(spec), phase)
-    assert intensity[..., :15].sub(1).abs().max() < 1e-3
-    assert intensity[..., 19:21].max() < 0.8
-
-
-def test_undiffracted_light_is_a_plane_wave_beside_the_modulated_light() -> None:
-    spec = spec_of()
-    model, phase = sharp(spec), random_phase(spec)
-    with torch.no_grad():
-        model.undiffracted[1] = torch.tensor([0.2, -0.3])
-        added = model(phase) - ideal(spec, on_panel(phase))
-        plane = ideal(spec, torch.full((2, *spec.shape), 0.2 - 0.3j))
-    assert added[0].abs().max() < 1e-4
-    assert torch.allclose(added[1], plane[1], atol=1e-4)
-
-
 def test_amplitude_and_angle_multiply_the_illumination() -> None:
     spec = spec_of(distance=0.0)
     model, phase = sharp(spec), random_phase(spec)
@@ -224,38 +180,6 @@ def test_defocus_is_a_change_of_distance(colour: int, pupil: float | None) -> No
         after = intensity_of(model, phase)[colour]
     assert (before - expected).norm() > 0.05 * expected.norm()
     assert (after - expected).norm() < 0.1 * (before - expected).norm()
-
-
-def test_coma_in_x_and_in_y_differ_by_a_quarter_turn() -> None:
-    spec = spec_of()
-    phase = smooth_phase(spec)
-    one, other = sharp(spec), sharp(spec)
-    with torch.no_grad():
-        one.aberration[:, MODES.index("coma_x")] = 0.5
-        other.aberration[:, MODES.index("coma_y")] = 0.5
-        image, turned = intensity_of(one, phase), intensity_of(other, phase.transpose(1, 2))
-        assert torch.allclose(image, turned.transpose(1, 2), atol=1e-3)
-        assert not torch.allclose(image, intensity_of(other, phase), atol=1e-2)
-
-
-def test_an_aberration_inside_the_iris_keeps_the_light() -> None:
-    spec = spec_of(pupil=0.7)
-    model, phase = sharp(spec), smooth_phase(spec)
-    with torch.no_grad():
-        power = squared_modulus(model.over_panel(phase)).sum((1, 2))
-        model.aberration.normal_(generator=torch.Generator().manual_seed(0))
-        assert torch.allclose(squared_modulus(model.over_panel(phase)).sum((1, 2)), power, rtol=1e-4)
-
-
-def test_brightness_scales_the_intensity() -> None:
-    spec = spec_of()
-    model, phase = DisplayModel(spec), smooth_phase(spec)
-    with torch.no_grad():
-        before = intensity_of(model, phase)
-        model.brightness[1] = math.log(2.5)
-        after = intensity_of(model, phase)
-    assert torch.equal(after[0], before[0])
-    assert torch.allclose(after[1], 2.5 * before[1], rtol=1e-4)
 
 
 def detuned(spec: DisplaySpec) -> DisplayModel:
@@ -298,51 +222,6 @@ def test_the_gradient_of_every_number_equals_finite_differences(name: str, monke
     assert (sides[0] - sides[1]) / (2 * h) == pytest.approx(float((gradient * direction).sum()), rel=1e-4)
 
 
-def measured(colours: int, count: int) -> tuple[DisplaySpec, list[Sample]]:
-    """Captures without noise of a simulated bench whose table is bent and which reflects light unmodulated."""
-    lut = LookUpTable(gamma=(1.2, 1.1, 0.9), gain=(0.92, 0.95, 1.05))
-    profile = replace(load_profile("ideal"), lut=lut, zero_order=ZeroOrder(0.04, 1.0)).scaled((64, 64))
-    bench = SimulatedBench(profile)
-    spec = replace(bench.spec, wavelengths=bench.spec.wavelengths[:colours])
-    draw, samples = torch.Generator().manual_seed(6), []
-    for number in range(count):
-        coarse = torch.rand(1, colours, 7, 7, generator=draw)
-        target = functional.interpolate(coarse, spec.region.shape, mode="bilinear")[0]
-        light = white_irradiance(target, spec)
-        handle = type("Handle", (), {"spec": spec})()
-        # spread over the levels, and none in the middle of the wrap
-        phase = Wirtinger(iterations=5, offset="none").solve(target[None], handle)[0] + TAU * (number + 0.5) / count
-        shown = torch.stack([spec.region.crop(bench.intensity(one, c)) for c, one in enumerate(phase)])
-        samples.append(Sample(phase, shown / light[:, None, None], target, light))
-    return spec, samples
-
-
-def test_a_fit_finds_the_gamma_the_gain_and_the_unmodulated_light_of_a_display() -> None:
-    """To a few percent, but for the levels next to the wrap: those are seen through crosstalk, which learns slowly."""
-    spec, samples = measured(colours=2, count=10)
-    approximator = HILPlus().approximator(spec)
-    for step in range(STEPS):
-        approximator.step(samples[step * 7 % len(samples)], step / STEPS)
-    model = approximator.model
-    with torch.no_grad():
-        level = torch.linspace(0, 1, KNOTS)
-        found = (TAU * level + model.table) * torch.exp(model.gain.mean((1, 2)))[:, None]
-        unmodulated = torch.view_as_complex(model.undiffracted) / math.sqrt(0.04 / 0.96)
-    for colour, (gamma, gain) in enumerate(((1.2, 0.92), (1.1, 0.95))):
-        error = (found[colour] - gain * TAU * level**gamma)[1:-1]
-        # a constant is not seen in an image, and unmodulated light turns with it
-        constant = error.mean()
-        assert (error - constant).abs().max() < 0.01 * TAU
-        turned = unmodulated[colour] * torch.polar(torch.tensor(1.0), -constant)
-        assert abs(complex(turned) - complex(math.cos(1), math.sin(1))) < 0.08
-        with torch.no_grad():
-            errors = [
-                float((approximator.image(s.light)(s.phase) - s.capture)[colour].norm() / s.capture[colour].norm())
-                for s in samples
-            ]
-        assert sorted(errors)[7] < 0.04
-
-
 def test_a_held_model_gives_what_a_learning_one_gives_and_the_same_gradient() -> None:
     spec = spec_of()
     learning, held = DisplayModel(spec), DisplayModel(spec).requires_grad_(False)
@@ -361,19 +240,6 @@ def test_a_held_model_gives_what_a_learning_one_gives_and_the_same_gradient() ->
     for intensity, gradient in others:
         assert torch.allclose(intensity, expected, rtol=1e-4, atol=1e-5)
         assert (gradient - slope).norm() < 1e-4 * slope.norm()
-
-
-def test_a_held_model_forgets_its_maps_when_it_is_given_other_parameters() -> None:
-    spec = spec_of()
-    held, other = DisplayModel(spec).requires_grad_(False), DisplayModel(spec)
-    phase = random_phase(spec)
-    before = held(phase)
-    with torch.no_grad():
-        other.amplitude += 0.5
-        other.brightness -= 0.3
-        held.load_state_dict(other.state_dict())
-        assert torch.allclose(held(phase), other(phase), rtol=1e-4, atol=1e-5)
-    assert not torch.allclose(held(phase), before, rtol=1e-2)
 
 
 @pytest.mark.parametrize(

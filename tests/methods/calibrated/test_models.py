@@ -89,18 +89,20 @@ def test_a_kernel_learns_another_distance() -> None:
     assert error(approximator, unseen) < 0.6 * before
 
 
-@pytest.mark.parametrize(("method", "part"), [(ParametricModel(), 0.2), (HybridModel(), 0.2), (CNNPropCNN(), 0.7)])
-def test_a_model_of_the_panel_learns_what_a_kernel_cannot(
-    method: ParametricModel | HybridModel | CNNPropCNN, part: float
-) -> None:
+def test_a_model_of_the_panel_learns_what_a_kernel_cannot() -> None:
     learned_from, unseen = samples(SPEC, bent, 12), samples(SPEC, bent, 3, seed=100)
-    approximator, kernel = method.approximator(SPEC), LearnedKernel().approximator(SPEC)
-    fit(approximator, learned_from, 200)
-    fit(kernel, learned_from, 200)
-    assert error(approximator, unseen) < part * error(kernel, unseen)
+    errors = []
+    for method in (LearnedKernel(), ParametricModel(), CNNPropCNN()):
+        approximator = method.approximator(SPEC)
+        fit(approximator, learned_from, 200)
+        errors.append(error(approximator, unseen))
+    kernel, parametric, network = errors
+    assert parametric < 0.2 * kernel
+    assert network < 0.7 * kernel
 
 
 def test_a_network_sees_where_it_is_and_no_colour_but_its_own() -> None:
+    torch.manual_seed(0)
     network = ColourByColour(2, 3, 1, 4)
     torch.nn.init.ones_(network.layers[-1].weight)  # type: ignore[arg-type]
     seen = torch.ones(2, 3, 20, 30)
@@ -111,13 +113,3 @@ def test_a_network_sees_where_it_is_and_no_colour_but_its_own() -> None:
     changed = network(seen).detach()
     assert torch.equal(changed[0], answer[0])
     assert not torch.equal(changed[1], answer[1])
-
-
-def test_a_held_display_is_not_moved_by_later_steps() -> None:
-    approximator = HybridModel().approximator(SPEC)
-    display, phase = approximator.image(LIGHT), a_phase(SPEC)
-    before = display(phase)
-    fit(approximator, samples(SPEC, bent, 2), 4)
-    assert torch.equal(display(phase), before)
-    assert not torch.allclose(approximator.image(LIGHT)(phase), before, atol=1e-4)
-    assert not before.requires_grad

@@ -61,7 +61,7 @@ def test_a_killed_search_goes_on_and_gives_the_same_gamma() -> None:
     memory = Memory()
     whole = SHORT.prepare(bench(1.2, memory))
     moments = len(memory.fate.passed)
-    for at in range(0, moments, 5):
+    for at in range(0, moments, 9):
         again = Memory()
         again.fate = Fate(at)
         with pytest.raises(Killed):

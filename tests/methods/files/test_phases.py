@@ -19,7 +19,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from scipy.io import savemat
-from scipy.sparse import csc_array
 from torch import Tensor
 
 from holobench_eval.core import plugins
@@ -86,36 +85,31 @@ def test_radians_of_single_precision_arrive_to_the_last_bit(tmp_path: Path) -> N
 
 @settings(max_examples=40, deadline=None)
 @given(
-    sign=st.sampled_from([1, -1]),
-    origin=st.floats(-7, 7),
-    two_pi=st.one_of(st.floats(8, 300), st.tuples(*3 * [st.floats(8, 300)])),
+    convention=st.fixed_dictionaries(
+        {
+            "sign": st.sampled_from([1, -1]),
+            "origin": st.floats(-7, 7),
+            "two_pi_level": st.one_of(st.floats(8, 300), st.tuples(*3 * [st.floats(8, 300)])),
+            "flip_horizontal": st.booleans(),
+            "flip_vertical": st.booleans(),
+            "order": st.sampled_from(["rgb", "bgr"]),
+        }
+    ),
     correction=st.one_of(st.none(), st.floats(25, 300), st.tuples(*3 * [st.floats(25, 300)])),
-    across=st.booleans(),
-    down=st.booleans(),
-    order=st.sampled_from(["rgb", "bgr"]),
 )
 def test_the_convention_of_a_file_is_undone(
-    tmp_path_factory: pytest.TempPathFactory,
-    sign: int,
-    origin: float,
-    two_pi: float | tuple[float, ...],
-    correction: float | tuple[float, ...] | None,
-    across: bool,
-    down: bool,
-    order: str,
+    tmp_path_factory: pytest.TempPathFactory, convention: dict[str, Any], correction: Any
 ) -> None:
-    folder = tmp_path_factory.mktemp("convention")
-    turns = (sign * (PHASE - origin) / math.tau)[:, :: -1 if down else 1, :: -1 if across else 1]
-    convention: dict[str, Any] = {"sign": sign, "origin": origin, "levels": "all", "order": order}
+    folder, params = tmp_path_factory.mktemp("convention"), {**convention, "levels": "all"}
+    down, across = (-1 if convention[flip] else 1 for flip in ("flip_vertical", "flip_horizontal"))
+    turns = (convention["sign"] * (PHASE - convention["origin"]) / math.tau)[:, ::down, ::across]
     if correction is not None:
         cv2.imwrite(str(folder / "flat.png"), LEVELS[0])
         turns = turns + LEVELS[0] / np.reshape(correction, (-1, 1, 1))
-        convention["correction"] = {"file": str(folder / "flat.png"), "two_pi_level": correction}
-    file = folder / "levels.npy"
-    np.save(file, (turns * np.reshape(two_pi, (-1, 1, 1)))[:: 1 if order == "rgb" else -1])
-    convention["two_pi_level"] = two_pi
-    found = solved(file, **convention, flip_horizontal=across, flip_vertical=down)
-    assert turns_apart(found, PHASE) < 1e-5
+        params["correction"] = {"file": str(folder / "flat.png"), "two_pi_level": correction}
+    levels = turns * np.reshape(convention["two_pi_level"], (-1, 1, 1))
+    np.save(folder / "levels.npy", levels if convention["order"] == "rgb" else levels[::-1])
+    assert turns_apart(solved(folder / "levels.npy", **params), PHASE) < 1e-5
 
 
 def test_a_picture_of_what_a_bench_shows_is_the_phase_to_half_a_level(tmp_path: Path) -> None:
@@ -129,11 +123,6 @@ def test_a_picture_of_what_a_bench_shows_is_the_phase_to_half_a_level(tmp_path: 
     for channel, level in enumerate(full):
         # where two pi is between two levels, and half
         assert turns_apart(found[channel], PHASE[channel]) < 0.75 / level
-
-
-def test_a_correction_map_is_one_of_the_files_of_a_target(tmp_path: Path) -> None:
-    method = plugins.build("methods", "phases", {"file": "a.png", "correction": {"file": "flat.bmp"}})
-    assert method.files("cat.jpg") == ["a.png", "flat.bmp"]
 
 
 def test_a_field_is_encoded_by_the_encoder_that_is_named_whether_in_one_file_or_two(tmp_path: Path) -> None:
@@ -172,7 +161,9 @@ def test_one_colour_takes_a_gray_file(tmp_path: Path) -> None:
     assert turns_apart(solved(tmp_path / "gray.png", colours=1), PHASE[:1]) < 1e-6
 
 
-def wrong_files(folder: Path) -> None:
+@pytest.fixture(scope="module")
+def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wrong")
     np.save(folder / "small.npy", PHASE[:, 1:])
     np.save(folder / "byte.npy", LEVELS)
     np.save(folder / "complex.npy", np.exp(1j * PHASE))
@@ -193,16 +184,14 @@ def wrong_files(folder: Path) -> None:
     (folder / "crash.mat").write_bytes(crash.replace(values, (200).to_bytes(4, "little") + values[4:]))
     savemat(folder / "two.mat", {"a": PHASE, "b": PHASE})
     savemat(folder / "struct.mat", {"a": {"phase": PHASE}})
-    savemat(folder / "sparse.mat", {"a": csc_array(np.eye(3))})
     (folder / "noise.png").write_bytes(bytes(range(200)))
     cv2.imwrite(str(folder / "alpha.png"), np.zeros((12, 12, 4), np.uint8))
     pixels = np.ascontiguousarray(np.moveaxis(LEVELS, 0, -1))
     picture, turned = Image.fromarray(pixels), Image.Exif()
     turned[274] = 3  # EXIF orientation: upside down
-    for ending in ("png", "tif"):
-        picture.save(folder / f"pages.{ending}", save_all=True, append_images=[picture.rotate(180)])
-        picture.save(folder / f"turned.{ending}", exif=turned)
-    for ending in ("png", "tif", "bmp"):
+    picture.save(folder / "pages.tif", save_all=True, append_images=[picture.rotate(180)])
+    picture.save(folder / "turned.png", exif=turned)
+    for ending in ("png", "bmp"):
         Image.fromarray(pixels[..., 0] > 127).save(folder / f"bit.{ending}")
     Image.fromarray(pixels[..., 0] // 16).convert("P").save(folder / "four.png", bits=4)
     picture.save(folder / "photograph.png", "JPEG")
@@ -211,6 +200,7 @@ def wrong_files(folder: Path) -> None:
     huge = np.lib.format.magic(1, 0) + np.uint16(118).tobytes()
     header = "{'descr': '<f8', 'fortran_order': False, 'shape': (900000, 900000), }"
     (folder / "huge.npy").write_bytes(huge + header.ljust(117).encode() + b"\n")
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -238,15 +228,11 @@ def wrong_files(folder: Path) -> None:
         ("crash.mat", {}, "damaged"),  # an unknown type, which crashes SciPy's reader on some machines
         ("two.mat", {}, "several variables; name one as 'variable'; it holds a, b"),
         ("struct.mat", {}, "'a' is of class struct; expected a full array of numbers"),
-        ("sparse.mat", {}, "'a' is of class sparse; expected a full array of numbers"),
         ("noise.png", {}, "no picture of 8 or 16 bits that can be read"),
         ("alpha.png", {}, "a picture with alpha"),
-        ("pages.png", {}, "2 frames or pages; expected a file with one picture"),
         ("pages.tif", {}, "2 frames or pages; expected a file with one picture"),
         ("turned.png", {}, "EXIF orientation 3; expected one that is stored upright"),
-        ("turned.tif", {}, "EXIF orientation 3; expected one that is stored upright"),
         ("bit.png", {}, "a 1-bit picture; expected 8 or 16 bits"),
-        ("bit.tif", {}, "a 1-bit picture; expected 8 or 16 bits"),
         ("bit.bmp", {}, "a 1-bit picture; expected 8 or 16 bits"),
         ("four.png", {}, "a 4-bit picture; expected 8 or 16 bits"),
         ("photograph.png", {}, "no picture of 8 or 16 bits that can be read"),
@@ -256,12 +242,13 @@ def wrong_files(folder: Path) -> None:
         ("small.npy", {"amplitude": "gone.npy"}, "3 x 11 x 12"),
     ],
 )
-def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, name: str, params: dict[str, Any], message: str) -> None:
-    wrong_files(tmp_path)
+def test_a_wrong_file_is_refused_in_one_line(
+    wrong_files: Path, name: str, params: dict[str, Any], message: str
+) -> None:
     if "correction" in params:
-        params = {"correction": {"file": params["correction"]["file"].replace("FOLDER", str(tmp_path))}}
+        params = {"correction": {"file": params["correction"]["file"].replace("FOLDER", str(wrong_files))}}
     with pytest.raises(CellError, match=message) as found:
-        solved(tmp_path / name, **params)
+        solved(wrong_files / name, **params)
     assert "\n" not in str(found.value)
 
 
@@ -331,12 +318,7 @@ def test_the_name_of_a_target_gives_a_hash_where_it_is_altered_and_a_stem_none()
 
 def test_the_files_of_a_target_are_those_that_are_read() -> None:
     params = {"file": "p/{target}-{channel}.png", "amplitude": "a/{stem}-{channel}.png", "channels": ["r", "g"]}
-    found = plugins.build("methods", "phases", params).files("my cat.jpg")
-    assert [Path(path).parent.name for path in found] == ["p", "p", "a", "a"]
-    assert all("/my_cat" in path and " " not in path for path in found)
-
-
-def test_numbers_are_read_as_they_are_stored(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", LEVELS)
-    assert read_array(tmp_path / "a.npy").dtype == np.uint8
-    assert np.array_equal(read_array(tmp_path / "a.npy"), LEVELS)
+    found = plugins.build("methods", "phases", params | {"correction": {"file": "flat.bmp"}}).files("my cat.jpg")
+    assert [Path(path).parent.name for path in found] == ["p", "p", "a", "a", ""]
+    assert all("/my_cat" in path and " " not in path for path in found[:4])
+    assert found[4] == "flat.bmp"

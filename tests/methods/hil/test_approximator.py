@@ -11,7 +11,7 @@ from torch import Tensor
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.api import DisplaySpec, ideal_image, white_irradiance
 from holobench_eval.methods.hil.approximator import NetworkApproximator
-from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss, LearningRates
+from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
 from holobench_eval.methods.hil.critic import Critic
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.plus import HILPlus
@@ -57,13 +57,6 @@ def test_the_input_is_the_ideal_intensity_in_the_unit_of_the_target(optics: dict
     assert torch.allclose(ideal, (ideal_image(phase, spec) / light.view(3, 1, 1))[None], atol=1e-5)
 
 
-def test_a_hologram_that_gives_all_its_light_to_a_target_is_as_bright_as_it() -> None:
-    (target,) = pictures(SPEC)
-    power = SPEC.shape[0] * SPEC.shape[1]
-    gathered = white_irradiance(target, SPEC) * target.sum((1, 2))
-    assert torch.allclose(gathered, torch.full((3,), float(power)), rtol=1e-5)
-
-
 def test_the_gain_makes_the_first_captures_as_bright_as_their_targets() -> None:
     one, targets = approximator(), pictures(SPEC, 3)
     dim = torch.tensor([0.5, 0.25, 4.0]).view(3, 1, 1)
@@ -88,15 +81,6 @@ def test_an_untrained_network_predicts_the_ideal_image_as_bright_as_the_captures
     targets = torch.stack([sample.target for sample in given])
     shown = torch.stack([one.ideal(sample.phase, sample.light)[0] for sample in given])
     assert torch.allclose((shown * targets).sum((0, 2, 3)), shown.square().sum((0, 2, 3)), rtol=1e-4)
-
-
-@pytest.mark.parametrize("of_amplitude", [False, True])
-def test_the_identity_predicts_the_ideal_image_in_the_unit_of_captures(of_amplitude: bool) -> None:
-    one = approximator(Network("identity"), with_critic=False, of_amplitude=of_amplitude)
-    (phase,) = phases()
-    light = torch.tensor([1.0, 2.0, 3.0])
-    one.gain = torch.tensor([2.0, 4.0, 8.0])
-    assert torch.allclose(one.image(light)(phase), one.ideal(phase, light)[0] / one.gain.view(3, 1, 1), atol=1e-6)
 
 
 def test_amplitudes_are_learned_as_square_roots_and_squared_back(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,28 +110,16 @@ def test_dark_noise_has_an_amplitude() -> None:
     assert all(value == value for value in one.step(black, 0.0).values())
 
 
-def test_training_brings_predictions_to_captures() -> None:
-    (sample,) = samples(1)
-    rates = LearningRates(generator=2e-3)
-    one = NetworkApproximator(SPEC, Network("unet", levels=2, width=16), None, False, seed=0, rates=rates)
-    one.expose([sample])
-
-    def error() -> float:
-        predicted = one.image(sample.light)(sample.phase)
-        return float((predicted - sample.capture).abs().mean().detach())
-
-    before = error()
-    for _ in range(150):  # from the speckle of a random phase, which the network first has to take away
-        one.step(sample, 0.0)
-    assert error() < 0.6 * before
+def made(kind: str, seed: int = 0) -> Any:
+    if kind == "plus":
+        return HILPlus(network=SMALL, seed=seed).approximator(SPEC)
+    return approximator(Network("pix2pix", levels=2, width=4) if kind == "dropout" else SMALL, seed=seed)
 
 
-def made(kind: str) -> Any:
-    return approximator() if kind == "network" else HILPlus(network=SMALL, seed=0).approximator(SPEC)
-
-
-@pytest.mark.parametrize("kind", ["network", "plus"])
-def test_a_frozen_display_does_not_change_when_training_goes_on(kind: str) -> None:
+@pytest.mark.parametrize("kind", ["network", "dropout", "plus"])
+def test_a_frozen_display_does_not_change_when_training_goes_on_and_has_a_gradient_in_the_phase_alone(
+    kind: str,
+) -> None:
     one, given = made(kind), samples(2)
     for sample in given:
         one.step(sample, 0.0)
@@ -157,32 +129,12 @@ def test_a_frozen_display_does_not_change_when_training_goes_on(kind: str) -> No
         one.step(sample, 0.0)
     assert torch.equal(frozen(given[0].phase).detach(), before)
     assert not torch.equal(one.image(given[0].light)(given[0].phase).detach(), before)
-
-
-@pytest.mark.parametrize("kind", ["network", "plus"])
-def test_a_frozen_display_is_differentiable_in_the_phase_alone(kind: str) -> None:
-    one, (sample,) = made(kind), samples(1)
-    phase = sample.phase.clone().requires_grad_()
-    one.image(sample.light)(phase).square().sum().backward()
+    one, phase = made(kind), given[0].phase.clone().requires_grad_()
+    one.image(given[0].light)(phase).square().sum().backward()
     assert phase.grad.isfinite().all()
     assert phase.grad.abs().max() > 0
-    network = one.trainer.generator if kind == "network" else one.network
+    network = one.network if kind == "plus" else one.trainer.generator
     assert all(value.grad is None for value in network.parameters())
-
-
-@pytest.mark.parametrize("kind", ["network", "plus"])
-def test_training_goes_on_from_a_file_to_identical_predictions(kind: str) -> None:
-    straight, stopped, given = made(kind), made(kind), samples(2)
-    straight.expose(given)
-    stopped.expose(given)
-    for sample in given:
-        straight.step(sample, 0.1)
-        stopped.step(sample, 0.1)
-    resumed = made(kind)
-    resumed.load_state_dict(through_a_file(stopped.state_dict()))
-    for sample in given:
-        assert straight.step(sample, 0.6) == resumed.step(sample, 0.6)
-    assert same(through_a_file(straight.state_dict()), through_a_file(resumed.state_dict()))
 
 
 @pytest.mark.parametrize("kind", ["network", "plus"])
@@ -190,7 +142,7 @@ def test_what_was_learned_gives_the_same_display_to_another(kind: str) -> None:
     one, (sample,) = made(kind), samples(1)
     one.expose([sample])
     one.step(sample, 0.0)
-    other = approximator(seed=9) if kind == "network" else HILPlus(network=SMALL, seed=9).approximator(SPEC)
+    other = made(kind, seed=9)
     other.load_learned(through_a_file(one.learned()))
     views = [each.image(sample.light)(sample.phase).detach() for each in (one, other)]
     assert torch.equal(*views)
@@ -202,30 +154,18 @@ def refuses(load: Any, weights: Any) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_the_weights_of_another_network_are_refused_in_one_line() -> None:
+def test_what_another_network_or_another_display_learned_is_refused_in_one_line() -> None:
     learned = approximator().learned()
     refuses(approximator(Network(levels=2, width=6)).load_learned, learned)
     refuses(approximator(Network(levels=3, width=4)).load_learned, learned)
     refuses(approximator(spec=small_spec(48, 40, colours=1)).load_learned, learned)
     refuses(approximator().load_learned, approximator(with_critic=False).learned())
-    for damaged in (
-        {},
-        {**learned, "generator": None},
-        {**learned, "judge": {"layers": 1}},
-        {**learned, "generator": 3},
-    ):
+    for damaged in ({}, {**learned, "generator": None}, {**learned, "judge": {"layers": 1}}):
         refuses(approximator().load_learned, damaged)
-
-
-def test_the_parameters_of_another_display_are_refused_in_one_line() -> None:
-    learned = HILPlus(network=SMALL, seed=0).approximator(SPEC).learned()
-    for other in (
-        HILPlus(network=Network(levels=2, width=6)).approximator(SPEC),
-        HILPlus(network=SMALL).approximator(small_spec(48, 40)),
-    ):
-        refuses(other.load_learned, learned)
-    alone = HILPlus().approximator(SPEC).learned()
-    refuses(HILPlus(network=SMALL, seed=0).approximator(SPEC).load_learned, alone)
+    learned = made("plus").learned()
+    refuses(HILPlus(network=Network(levels=2, width=6)).approximator(SPEC).load_learned, learned)
+    refuses(HILPlus(network=SMALL).approximator(small_spec(48, 40)).load_learned, learned)
+    refuses(made("plus").load_learned, HILPlus().approximator(SPEC).learned())
 
 
 @pytest.mark.parametrize("network", [SMALL, Network(levels=2, width=4, full_resolution_stage=False)])
@@ -280,3 +220,12 @@ def test_the_critic_is_shown_predictions_as_bright_as_their_targets(monkeypatch:
     assert torch.equal(target[0], sample.target)
     predicted = one.trainer.generator(one.ideal(sample.phase, sample.light))[0].detach()
     assert torch.allclose(picture[0], matched(predicted, sample.target), atol=1e-5)
+
+
+@pytest.mark.parametrize("of_amplitude", [False, True])
+def test_the_identity_predicts_the_ideal_image_in_the_unit_of_captures(of_amplitude: bool) -> None:
+    one = approximator(Network("identity"), with_critic=False, of_amplitude=of_amplitude)
+    (phase,) = phases()
+    light = torch.tensor([1.0, 2.0, 3.0])
+    one.gain = torch.tensor([2.0, 4.0, 8.0])
+    assert torch.allclose(one.image(light)(phase), one.ideal(phase, light)[0] / one.gain.view(3, 1, 1), atol=1e-6)

@@ -71,7 +71,7 @@ def test_steps_lower_the_loss_of_every_network(name: str) -> None:
     assert sum(losses[-5:]) < 0.8 * sum(losses[:5])
 
 
-@pytest.mark.parametrize("name", TRAINED)
+@pytest.mark.parametrize("name", ["pix2pix", "pix2pixhd"])
 def test_training_goes_on_from_a_saved_state_to_identical_weights(name: str) -> None:
     """Pix2Pix has dropout, whose random numbers go on as well."""
     straight, stopped = small(name), small(name)
@@ -93,23 +93,11 @@ def test_dropout_is_noise_of_the_trainer_alone() -> None:
     first = small("pix2pix")
     before = [first.step(*pair(number)) for number in range(2)]
     torch.manual_seed(6)
+    state = torch.get_rng_state()
     second = small("pix2pix")
     assert [second.step(*pair(number)) for number in range(2)] == before
-    assert before[0]["l1"] != before[1]["l1"]
-
-
-def test_torchs_random_numbers_are_left_as_found() -> None:
-    state = torch.get_rng_state()
-    small("pix2pix").step(*pair())
     assert torch.equal(torch.get_rng_state(), state)
-
-
-def test_weights_depend_on_the_seed_and_on_nothing_else() -> None:
-    torch.manual_seed(1)
-    first = weights(small(seed=3))
-    torch.manual_seed(2)
-    assert same(weights(small(seed=3)), first)
-    assert not same(weights(small(seed=4)), first)
+    assert before[0]["l1"] != before[1]["l1"]
 
 
 def test_the_total_is_the_weighted_sum_of_eq_20() -> None:
@@ -149,13 +137,6 @@ def test_feature_matching_sums_mean_differences_without_the_logits() -> None:
     assert float(feature_matching_loss(ours, theirs)) == pytest.approx(1.5)
 
 
-def test_an_unconditional_discriminator_ignores_the_ideal_image() -> None:
-    (ideal, capture), (other, _) = pair(), pair(1)
-    for conditional in (True, False):
-        judge = small(conditional=conditional).discriminator
-        assert torch.equal(judge(capture, ideal), judge(capture, other)) != conditional
-
-
 def test_each_optimiser_moves_its_own_network_by_at_most_the_published_rate() -> None:
     training = small()
     before = weights(training)
@@ -184,27 +165,6 @@ def test_the_generators_rate_falls_along_half_a_cosine_and_the_discriminators_st
     generator, discriminator = step(1.0)
     assert generator == 0
     assert discriminator > 1e-4
-
-
-def test_the_generators_step_leaves_no_gradient_in_the_discriminator() -> None:
-    training = small()
-    ideal, capture = pair()
-    training._step_generator(training.generator(ideal), ideal, capture)
-    assert all(value.grad is None for value in training.discriminator.parameters())
-
-
-def test_a_frozen_generator_is_a_copy_that_predicts_and_does_not_learn() -> None:
-    training = small("pix2pix")
-    frozen = training.frozen()
-    ideal, capture = pair()
-    before = frozen(ideal)
-    training.step(ideal, capture)
-    assert torch.equal(frozen(ideal), before)
-    assert not torch.equal(training.frozen()(ideal), before)
-    shown = ideal.clone().requires_grad_()
-    frozen(shown).sum().backward()
-    assert shown.grad.abs().max() > 0
-    assert all(value.grad is None and not value.requires_grad for value in frozen.parameters())
 
 
 def test_the_identity_has_losses_and_nothing_to_learn() -> None:
@@ -244,26 +204,17 @@ def test_images_that_do_not_belong_together_are_refused() -> None:
         small().step(pair()[0], pair(size=48)[1])
 
 
-@pytest.mark.parametrize("damage", ["empty", "other network", "moments", "noise", "perceptual", "not a dictionary"])
-def test_a_state_that_does_not_fit_is_refused_in_one_line(damage: str) -> None:
+def test_a_state_that_does_not_fit_is_refused_in_one_line() -> None:
     training = small()
     training.step(*pair())
     state: Any = training.state_dict()
-    if damage == "empty":
-        state = {}
-    elif damage == "other network":
-        state = trainer(Network(levels=3, width=4), None, 3, 3, 0).state_dict()
-    elif damage == "moments":
-        state["optimisers"]["generator"][0]["exp_avg"] = torch.zeros(1)
-    elif damage == "noise":
-        state["noise"] = torch.zeros(3)
-    elif damage == "perceptual":
-        state["perceptual"] = "vgg19"
-    else:
-        state = [1, 2]
-    with pytest.raises(UserError, match="the saved training does not fit") as caught:
-        small().load_state_dict(state)
-    assert "\n" not in str(caught.value)
+    moments = copy.deepcopy(state)
+    moments["optimisers"]["generator"][0]["exp_avg"] = torch.zeros(1)
+    other = trainer(Network(levels=3, width=4), None, 3, 3, 0).state_dict()
+    for wrong in ({}, other, moments, state | {"noise": torch.zeros(3)}, state | {"perceptual": "vgg19"}, [1, 2]):
+        with pytest.raises(UserError, match="the saved training does not fit") as caught:
+            small().load_state_dict(wrong)
+        assert "\n" not in str(caught.value)
 
 
 def test_a_discriminator_learns_to_tell_predictions_from_captures() -> None:
@@ -287,3 +238,10 @@ def test_moments_are_laid_out_as_the_weights() -> None:
     resumed.load_state_dict(state)
     assert training.step(*pair(1)) == resumed.step(*pair(1))
     assert same(weights(training), weights(resumed))
+
+
+def test_the_generators_step_leaves_no_gradient_in_the_discriminator() -> None:
+    training = small()
+    ideal, capture = pair()
+    training._step_generator(training.generator(ideal), ideal, capture)
+    assert all(value.grad is None for value in training.discriminator.parameters())

@@ -61,14 +61,6 @@ def test_only_a_conditional_discriminator_sees_the_ideal_image(
         assert not torch.allclose(discriminator(image(96, 3), image(96, 1)), verdicts[0])
 
 
-def test_logits_may_have_any_sign_and_size() -> None:
-    discriminator = PatchDiscriminator(3, 3, width=4)
-    discriminator.layers[-1][0].weight.data *= 1000
-    logits = discriminator(image(), image(64, 1)).detach()
-    assert float(logits.min()) < -1
-    assert float(logits.max()) > 1
-
-
 @pytest.mark.parametrize(
     ("discriminator", "smallest"),
     [

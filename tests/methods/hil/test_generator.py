@@ -118,12 +118,6 @@ def test_the_output_is_linear_in_the_last_layer() -> None:
     assert float(generator(picture()).detach().abs().max()) > 2
 
 
-def test_a_batch_is_predicted_image_by_image() -> None:
-    generator, images = small(), torch.cat([picture(), picture().flip(-1)])
-    together = generator(images)
-    assert torch.allclose(together, torch.cat([generator(image[None]) for image in images]), atol=1e-6)
-
-
 def weights(generator: Generator) -> dict[str, tuple[int, ...]]:
     """Shapes of the convolutions' weights."""
     return {name: tuple(value.shape) for name, value in generator.named_parameters() if value.ndim == 4}

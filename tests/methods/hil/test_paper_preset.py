@@ -1,7 +1,7 @@
 """The paper's network at the paper's size fits into the memory of one accelerator of its time, 24 GB, on a CPU too.
 
-Arrays grow with the pixels. So a quarter of them, which takes a quarter of the time, has to fit into a quarter of it,
-with all libraries.
+Arrays grow with the pixels, and weights do not. So what a step on fewer pixels takes beside libraries and weights is
+an upper bound of what a step takes, once it is multiplied by the ratio of the pixels.
 """
 
 from __future__ import annotations
@@ -14,9 +14,14 @@ from pathlib import Path
 
 import pytest
 
-LIMIT = 24e9 / 4
+LIMIT = 24e9
+PADDED = 1280 * 2048 / (512 * 768)  # pixels inside the network, of the paper's size and here
 TRAIN_AND_RETRIEVE = """
 import json, resource
+
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
 resource.setrlimit(resource.RLIMIT_AS, (int(24e9), int(24e9)))  # as a whole: what is reserved is not used
 import torch
 from tests.support.small_training import pictures
@@ -30,17 +35,18 @@ from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
 
 torch.set_num_threads(1)
 spec = DisplaySpec(
-    "quarter", (540, 960), 6.4e-6, (636e-9, 517e-9, 446e-9), 0.1, 8, 0.8, Region(0, 0, 540, 960)
+    "small", (384, 640), 6.4e-6, (636e-9, 517e-9, 446e-9), 0.1, 8, 0.8, Region(0, 0, 384, 640)
 )
 (target,) = pictures(spec)
 phase = 4 * target.flip(-1)
 sample = Sample(phase, 0.8 * target, target, white_irradiance(target, spec))
 approximator = NetworkApproximator(spec, Network(preset="paper"), ApproximatorLoss(), with_critic=True, seed=0)
 approximator.expose([sample])
+before = peak()
 losses = approximator.step(sample, 0.0)
 found = retrieve(approximator.image(sample.light), target, phase, PhaseRetrieval(iterations=1), approximator.verdict)
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-print(json.dumps({"losses": losses, "shape": list(found.shape), "finite": bool(found.isfinite().all()), "peak": peak}))
+found = {"shape": list(found.shape), "finite": bool(found.isfinite().all())}
+print(json.dumps({"losses": losses, "before": before, "peak": peak(), **found}))
 """
 
 
@@ -53,7 +59,7 @@ def test_a_training_step_and_a_retrieval_stay_below_24_gigabytes_at_full_size(tm
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout)
-    assert found["peak"] < LIMIT
-    assert found["shape"] == [3, 540, 960]
+    assert found["before"] + PADDED * (found["peak"] - found["before"]) < LIMIT
+    assert found["shape"] == [3, 384, 640]
     assert found["finite"]
     assert all(found["losses"][name] > 0 for name in ("l1", "perceptual", "adversarial", "discriminator", "judge"))

@@ -108,25 +108,18 @@ def test_a_folder_is_searched_and_an_empty_one_is_refused_with_the_address(vgg: 
             perceptual_loss(place)
 
 
-@pytest.mark.parametrize("content", ["not a checkpoint", "a list", "missing layer", "wrong shape", "nan", "code"])
-def test_a_bad_file_is_refused_in_one_line(vgg: Path, tmp_path: Path, content: str) -> None:
+def test_a_bad_file_is_refused_in_one_line(vgg: Path, tmp_path: Path) -> None:
     path, state = tmp_path / "vgg19-bad.pth", torch.load(vgg, weights_only=True)
-    if content == "not a checkpoint":
-        path.write_bytes(b"<html>404</html>")
-    elif content == "a list":
-        torch.save([1, 2], path)
-    elif content == "missing layer":
-        torch.save({key: value for key, value in state.items() if ".7." not in key}, path)
-    elif content == "wrong shape":
-        torch.save(state | {"features.2.weight": torch.zeros(64, 64, 1, 1)}, path)
-    elif content == "nan":
-        torch.save(state | {"features.5.bias": torch.full((128,), torch.nan)}, path)
-    else:
-        torch.save(torch.nn.Linear(2, 2), path)  # a pickled object: loading it would run code
-    with pytest.raises(UserError) as caught:
-        perceptual_loss(path)
-    assert "\n" not in str(caught.value)
-    assert str(path) in str(caught.value)
+    fewer = {key: value for key, value in state.items() if ".7." not in key}
+    other = state | {"features.2.weight": torch.zeros(64, 64, 1, 1)}
+    infinite = state | {"features.5.bias": torch.full((128,), torch.nan)}
+    # no checkpoint at all, and a pickled object: loading it would run code
+    for content in (b"<html>404</html>", [1, 2], fewer, other, infinite, torch.nn.Linear(2, 2)):
+        path.write_bytes(content) if isinstance(content, bytes) else torch.save(content, path)
+        with pytest.raises(UserError) as caught:
+            perceptual_loss(path)
+        assert "\n" not in str(caught.value)
+        assert str(path) in str(caught.value)
 
 
 def test_the_checksum_in_a_name_is_checked(vgg: Path, tmp_path: Path) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,7 +16,6 @@ from holobench_eval.methods.learned.checkpoint import Checkpoint
 from holobench_eval.methods.learned.fidelity import fidelity
 from holobench_eval.methods.learned.retrieval import Image
 from holobench_eval.methods.learned.samples import Sample, Schedule
-from holobench_eval.study.artifacts import FolderMemory
 from tests.support.small_training import Fate, Killed, Memory, same, small_spec, training_bench
 
 SPEC = small_spec(size=24, region=16)
@@ -156,12 +153,6 @@ def test_the_order_depends_on_the_study_and_on_the_round() -> None:
     assert order(3)[0] != order(3)[1]
 
 
-def test_the_unit_of_captures_is_chosen_from_the_first_round_alone() -> None:
-    memory = Memory()
-    approximator = run(training_bench(SPEC, memory), Schedule(3, steps=2, refine_steps=2), memory)
-    assert approximator.exposed == [3]
-
-
 def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory)
@@ -177,82 +168,37 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
 RESUMED = Schedule(3, images=2, refine_images=1, steps=4, refine_steps=4)
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """A training's end: what it kept, its approximator, and the captures it counted."""
-
-    memory: Memory
-    approximator: Scale
-    captures: int
-
-    def values(self) -> dict[str, Any]:
-        return {name: kept["value"] for name, kept in self.memory.kept.items()}
+def ended(memory: Memory, fate: Fate | None = None) -> dict[str, Any]:
+    """Of a training that goes on from what the memory holds: its state, its captures, its rows and all it kept."""
+    bench = training_bench(SPEC, memory, fate)
+    state = run(bench, RESUMED, memory).state_dict()
+    values = {name: memory.kept[name]["value"] for name in sorted(memory.kept)}
+    return {"state": state, "captures": bench.captures, "rows": memory.story, "values": values}
 
 
-def finished(memory: Memory) -> Outcome:
-    """A training that goes on from what the memory holds, to its end."""
-    bench = training_bench(SPEC, memory)
-    return Outcome(memory, run(bench, RESUMED, memory), bench.captures)
-
-
-@pytest.fixture(scope="module")
-def whole() -> Outcome:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
-        return finished(Memory())
-
-
-@pytest.fixture(scope="module")
-def resumed(whole: Outcome) -> dict[int, Outcome]:
-    """Trainings that were killed at each moment of an undisturbed one, and started again."""
-    moments, outcomes = whole.memory.fate.passed, {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
-        for at in range(len(moments)):
-            memory, fate = Memory(), Fate(at)
-            with pytest.raises(Killed):
-                run(training_bench(SPEC, memory, fate), RESUMED, memory)
-            assert fate.passed == moments[: at + 1]
-            outcomes[at] = finished(memory)
-    return outcomes
-
-
-def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_values_and_rows(
-    whole: Outcome, resumed: dict[int, Outcome]
-) -> None:
+def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_values_and_rows() -> None:
     """Between photographs, in and between steps, around every save and row, in every round and with images held out."""
-    assert len(resumed) > 60
-    for at, outcome in resumed.items():
-        moment = (at, whole.memory.fate.passed[at])
-        assert same(outcome.approximator.state_dict(), whole.approximator.state_dict()), moment
-        assert outcome.captures == whole.captures, moment
-        assert outcome.memory.story == whole.memory.story, moment
-        assert outcome.values().keys() == whole.values().keys(), moment
-        assert all(same(value, whole.values()[name]) for name, value in outcome.values().items()), moment
+    undisturbed = Memory()
+    whole, moments = ended(undisturbed), undisturbed.fate.passed
+    assert len(moments) > 60
+    for at in range(len(moments)):
+        memory, fate = Memory(), Fate(at)
+        with pytest.raises(Killed):
+            ended(memory, fate)
+        assert fate.passed == moments[: at + 1]
+        assert same(ended(memory), whole), (at, moments[at])
 
 
-def test_a_training_killed_again_and_again_ends_the_same(whole: Outcome) -> None:
+def test_a_training_killed_again_and_again_ends_the_same() -> None:
     memory, kills = Memory(), 0
     while kills < 40:
-        bench = training_bench(SPEC, memory, Fate(14))
         try:
-            approximator = run(bench, RESUMED, memory)
+            found = ended(memory, Fate(14))
             break
         except Killed:
             kills += 1
     assert 3 < kills < 40
-    assert same(approximator.state_dict(), whole.approximator.state_dict())
-    assert bench.captures == whole.captures
-
-
-def test_the_log_in_a_folder_has_the_losses_and_the_fidelity_of_every_round(tmp_path: Path) -> None:
-    memory = FolderMemory(tmp_path)
-    bench = training_bench(SPEC, Memory())
-    bench._memory = memory
-    train(bench, Scale(Fate()), begin, search, Schedule(2, steps=3, refine_steps=3))
-    rows = memory.rows()
-    assert sum(bool(row.get("fidelity_psnr")) for row in rows) == 2
-    assert sum(bool(row.get("error")) for row in rows) == 2
+    assert same(found, ended(Memory()))
 
 
 def test_a_row_tells_the_mean_loss_since_the_row_earlier() -> None:

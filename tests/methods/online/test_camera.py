@@ -10,7 +10,6 @@ from holobench_eval.methods.online.camera import OnlineCamera
 from holobench_eval.methods.online.network import OnlineCameraNetwork
 from holobench_eval.methods.online.start import Camera, CameraStart, captured_error
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
-from holobench_eval.testing.contract import check_method
 from tests.support.toy_camera import SPEC, Plug, ToyDisplay, picture
 
 FAULTY = {"aberration": 0.6, "unmodulated": 0.3}
@@ -65,7 +64,7 @@ def test_its_gradient_is_the_wirtinger_gradient_where_the_display_is_ideal():
         assert torch.cosine_similarity(found.flatten(), wanted.flatten(), dim=0) > 0.9999
 
 
-@pytest.mark.parametrize("captures", [1, 3, 9, 20, 37])
+@pytest.mark.parametrize("captures", [1, 3, 9, 37])
 def test_it_stops_at_its_captures(captures):
     display, target = ToyDisplay(**FAULTY), picture()
     phase, handle = solved(display, target, captures=captures)
@@ -80,20 +79,15 @@ def test_its_schedule_is_planned_for_the_budget_of_the_display():
     assert torch.equal(within, solved(display, target, captures=30)[0])
 
 
-def test_frames_are_averaged_within_the_same_captures():
-    display, target = ToyDisplay(**FAULTY, noise=0.1), picture()
-    _, handle = solved(display, target, captures=50, frames=4)
-    assert 46 < handle.captures <= 50
-
-
-def test_a_batch_shares_the_budget():
-    display, targets = ToyDisplay(**FAULTY), torch.stack([picture(), picture(1)])
+def test_averaged_frames_and_a_batch_share_the_captures():
+    display, targets = ToyDisplay(**FAULTY, noise=0.1), torch.stack([picture(), picture(1)])
+    assert 46 < solved(display, targets[0], captures=50, frames=4)[1].captures <= 50
     handle = display.handle(method := OnlineCamera(start=QUICK), targets[0], 41)
     assert method.solve(targets, handle).shape == (2, 2, *SPEC.shape)
     assert handle.captures == 40
 
 
-ENDS = {OnlineCamera: (0, 1, 5, 12, 30, 39), WithNetwork: (0, 1, 9, 14, 30)}
+ENDS = {OnlineCamera: (0, 1, 12, 39), WithNetwork: (0, 9, 30)}
 
 
 @pytest.mark.parametrize(("of", "at"), [(of, at) for of, ends in ENDS.items() for at in ends])
@@ -171,8 +165,3 @@ def test_the_captured_error_is_the_one_that_is_scored():
     factor = (bright * target).sum((1, 2), True) / bright.square().sum((1, 2), True)
     wanted = ((factor * bright).clamp(0, 1) - target).square().mean((1, 2))
     assert torch.allclose(captured_error(bright, target), wanted)
-
-
-@pytest.mark.parametrize("of", [OnlineCamera, WithNetwork])
-def test_it_keeps_the_contract_of_methods(of):
-    check_method(of(captures=20, start=CameraStart(converged=Wirtinger(iterations=12), offsets=2)))

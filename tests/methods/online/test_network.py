@@ -18,14 +18,14 @@ def test_rounds_of_captures_improve_the_hologram():
     assert (display.error(phase, target) < 0.5 * display.error(nominal(display, target), target)).all()
 
 
-@pytest.mark.parametrize(("faults", "noise"), [({}, 0.0), ({}, 0.3), (FAULTY, 0.3)])
+@pytest.mark.parametrize(("faults", "noise"), [({}, 0.0), (FAULTY, 0.3)])
 def test_neither_an_ideal_display_nor_noise_makes_it_worse_than_wirtinger_holography(faults, noise):
     display, target = ToyDisplay(**faults, noise=noise), picture()
     phase, _ = solved(display, target, **SMALL, captures=42)
     assert (display.scored(phase, target) < 1.02 * display.scored(nominal(display, target), target)).all()
 
 
-@pytest.mark.parametrize("budget", [1, 8, 21, 40])
+@pytest.mark.parametrize("budget", [1, 8, 40])
 def test_it_stays_within_the_budget_of_the_display(budget):
     phase, handle = solved(ToyDisplay(**FAULTY), picture(), budget, **SMALL, steps=1)
     assert handle.captures <= budget

@@ -11,7 +11,15 @@ from holobench_eval.display import load_profile
 from holobench_eval.display.api import ideal_image
 from holobench_eval.display.simulated.stages import StrayLight
 from holobench_eval.display.training import TrainingBench, TrainingImage
-from holobench_eval.methods.predictors.nested import FieldNetwork, ImageNetwork, ImageTermsModel, NestedPrediction
+from holobench_eval.methods.calibrated import patterns
+from holobench_eval.methods.predictors.nested import (
+    FieldNetwork,
+    ImageNetwork,
+    ImageTermsModel,
+    NestedPrediction,
+    OneRound,
+)
+from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics.error_budget import unexplained
 from holobench_eval.study.opening import open_bench
 from tests.support.small_training import Memory, pictures, small_spec
@@ -56,13 +64,14 @@ def test_the_error_is_squared_and_relative() -> None:
     assert float(approximator.error(1.1 * capture, capture)) == pytest.approx(0.01, rel=1e-4)
 
 
-@pytest.mark.parametrize("share", [0.2, 0.6])
-def test_image_terms_find_the_share_and_reach_of_stray_light(share: float) -> None:
-    panel = (120, 120)
+def test_image_terms_find_the_share_and_reach_of_stray_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patterns, "Wirtinger", lambda: Wirtinger(iterations=40))
+    panel, share = (120, 120), 0.4
     profile = replace(load_profile("ideal").scaled(panel), stray_light=StrayLight(share, 0.125))
     display = open_bench(profile, panel, 0)
-    images = [TrainingImage(f"picture {number}", picture) for number, picture in enumerate(pictures(display.spec, 6))]
-    bench = TrainingBench(display, "image_terms", images[:5], images[5:], Memory(), None, 0)
-    terms = ImageTermsModel().prepare(bench)["terms"]
+    images = [TrainingImage(f"picture {number}", picture) for number, picture in enumerate(pictures(display.spec, 4))]
+    bench = TrainingBench(display, "image_terms", images[:3], images[3:], Memory(), None, 0)
+    method = ImageTermsModel(training=OneRound(steps=400), start=Wirtinger(iterations=20))
+    terms = method.prepare(bench)["terms"]
     assert terms["share"].sigmoid().tolist() == pytest.approx([share] * 3, abs=0.05)
     assert terms["reach"].exp().tolist() == pytest.approx([0.125] * 3, abs=0.02)

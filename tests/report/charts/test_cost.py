@@ -8,26 +8,27 @@ import pytest
 from matplotlib.figure import Figure
 from skimage.io import imread
 
-from holobench_eval.report import Results, records_frame
 from holobench_eval.report.charts import cost
 from holobench_eval.report.charts.look.methods import looks
+from holobench_eval.report.charts.style import save
 from holobench_eval.report.data.board import board
 from tests.support import budget_study as budget
 
 
-@pytest.fixture(scope="module")
-def found() -> Results:
-    layout = budget.layout()
-    return Results(records_frame(budget.study(), layout), layout)
-
-
 def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(
-    found: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    found = budget.results()
     figures: list[Figure] = []
-    monkeypatch.setattr(cost, "save", lambda figure, path: figures.append(figure))
     displays = board(found).displays
+
+    def noted(figure: Figure, path: Path) -> None:
+        figures.append(figure)
+        save(figure, path)
+
+    monkeypatch.setattr(cost, "save", noted)
     cost.draw_costs(tmp_path / "x.png", displays, found.names, looks(found.names), "PSNR [dB]")
+    assert imread(tmp_path / "x.png").shape[1] == 900  # as wide as any other
     for axes, display in zip(figures[0].axes, displays, strict=True):
         rows = [row for row in display.rows if row.label not in found.layout.privileged]
         legend = axes.get_legend()
@@ -35,8 +36,3 @@ def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(
         assert {text.get_text() for text in legend.get_texts()} == {row.label for row in rows}
         marks = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1}
         assert {(row.photographs, row.score.mean) for row in rows} <= marks
-
-
-def test_a_picture_is_as_wide_as_any_other(found: Results, tmp_path: Path) -> None:
-    cost.draw_costs(tmp_path / "x.png", board(found).displays, found.names, looks(found.names), "PSNR [dB]")
-    assert imread(tmp_path / "x.png").shape[1] == 900

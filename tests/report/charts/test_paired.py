@@ -8,9 +8,9 @@ from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic
 
 
-def results(**changes):
-    layout = budget.layout(**changes)
-    return Results(records_frame(budget.study(), layout), layout)
+@pytest.fixture(scope="module")
+def found():
+    return budget.results()
 
 
 @pytest.fixture
@@ -30,20 +30,18 @@ def marks(axes):
     return [line for line in axes.lines if len(line.get_xdata()) == 1 and line.get_zorder() == 5]
 
 
-def test_every_method_has_a_row_and_the_best_stands_first(drawn, tmp_path):
-    found = results()
+def test_every_method_has_a_row_with_its_mark_number_and_dots_and_the_best_stands_first(found, drawn, tmp_path):
     paired.draw(found, "leto-aged", tmp_path / "x.png")
     axes = drawn[0].axes[0]
     gains = {name: found.gain(name, "leto-aged").mean for name in budget.ROWS if name != "wirtinger"}
     assert names(axes)[0] == "oracle"
     assert [name.partition(",")[0].replace("\n", " ") for name in names(axes)] == sorted(gains, key=gains.get)[::-1]
     assert [float(line.get_xdata()[0]) for line in marks(axes)] == pytest.approx(sorted(gains.values())[::-1])
-
-
-def test_a_dot_is_the_difference_of_one_target_at_the_same_height_in_every_row(drawn, tmp_path):
-    found = results()
-    paired.draw(found, "leto-aged", tmp_path / "x.png")
-    dots = [collection.get_offsets() for collection in drawn[0].axes[0].collections if len(collection.get_offsets())]
+    row = names(axes).index("hil")
+    assert (marks(axes)[row].get_markeredgecolor(), marks(axes)[row].get_marker()) == REGISTRY["hil"]
+    assert axes.texts[row].get_text() == found.headline.estimate(found.gain("hil", "leto-aged"), signed=True)
+    # a dot is the difference of one target, at the same height in every row
+    dots = [collection.get_offsets() for collection in axes.collections]
     dots = [offsets for offsets in dots if len(offsets) == len(budget.TARGETS)]
     assert len(dots) == len(budget.ROWS) - 1
     expected = found.values("oracle", "leto-aged") - found.values("wirtinger", "leto-aged")
@@ -51,18 +49,8 @@ def test_a_dot_is_the_difference_of_one_target_at_the_same_height_in_every_row(d
     assert np.asarray(dots[1][:, 1] - 1) == pytest.approx(np.asarray(dots[0][:, 1]))
 
 
-def test_marks_have_the_look_of_their_methods_and_the_numbers_stand_beside(drawn, tmp_path):
-    found = results()
-    paired.draw(found, "leto-aged", tmp_path / "x.png")
-    axes = drawn[0].axes[0]
-    row = names(axes).index("hil")
-    assert (marks(axes)[row].get_markeredgecolor(), marks(axes)[row].get_marker()) == REGISTRY["hil"]
-    assert axes.texts[row].get_text() == found.headline.estimate(found.gain("hil", "leto-aged"), signed=True)
-
-
-def test_the_line_at_zero_is_the_baseline_and_a_constant_image_has_one(tmp_path, monkeypatch, drawn):
+def test_the_line_at_zero_is_the_baseline_and_a_constant_image_has_one(found, tmp_path, monkeypatch, drawn):
     monkeypatch.setattr(Results, "above_floor", lambda self, *_: self.gain("oracle", "leto-aged"))
-    found = results()
     paired.draw(found, "leto-aged", tmp_path / "x.png")
     handles, labels = drawn[0].axes[0].get_legend_handles_labels()
     places = [float(line.get_xdata()[0]) for line in handles]
@@ -80,18 +68,16 @@ def test_a_hole_is_counted_in_the_name_of_its_row(drawn, tmp_path):
     assert f"hil, {len(budget.TARGETS) - 1} of {len(budget.TARGETS)} targets" in names(drawn[0].axes[0])
 
 
-def test_without_a_baseline_nothing_is_drawn(tmp_path):
-    assert not paired.displays(results(baseline=None))
-    assert not (tmp_path / "x.png").exists()
+def test_without_a_baseline_nothing_is_drawn():
+    assert not paired.displays(budget.results(baseline=None))
 
 
 def test_a_name_full_of_mathematics_stays_text(tmp_path):
     evil = r"$\frac{a}{0}$ <b>"
-    layout = synthetic.layout(pairs=((evil, "leto-aged"), ("Wirtinger", "leto-aged")), targets=("coffee", "rocket"))
     records = [
         synthetic.record(label, synthetic.cell(name, target, "leto-aged"), {"psnr_linear": value})
         for label, name, value in ((evil, "mine.py:Evil", 20.0), ("Wirtinger", "wirtinger", 19.0))
         for target in ("coffee", "rocket")
     ]
-    paired.draw(Results(records_frame(records, layout), layout), "leto-aged", tmp_path / "x.png")
+    paired.draw(synthetic.results(records), "leto-aged", tmp_path / "x.png")
     assert (tmp_path / "x.png").stat().st_size > 2000

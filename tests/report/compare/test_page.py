@@ -15,11 +15,6 @@ A, B = [20.0, 21.0, 22.0], [20.5, 21.4, 22.6]
 HOSTILE = ("<script>alert(1)</script>", "a | b", "=cmd()", "[x](http://example.org)", "*bold*")
 
 
-@pytest.fixture
-def comparison(tmp_path: Path) -> Comparison:
-    return of_methods(tmp_path, "toy")
-
-
 def of_methods(folder: Path, *names: str) -> Comparison:
     runs = (
         read_run(write_report(folder / run, {(name, "bench"): values for name in names}, {"revision": run}))
@@ -28,16 +23,13 @@ def of_methods(folder: Path, *names: str) -> Comparison:
     return compare(*runs)
 
 
-def test_markdown_and_csv_have_the_same_numbers(comparison: Comparison) -> None:
-    row = next(reader.DictReader(io.StringIO(csv(comparison))))
+def test_markdown_and_csv_have_the_same_numbers_and_the_page_says_what_differs_besides(tmp_path: Path) -> None:
+    comparison = of_methods(tmp_path, "toy")
+    text, row = markdown(comparison), next(reader.DictReader(io.StringIO(csv(comparison))))
     mean, low, high = (float(row[f"difference{end}"]) for end in ("", "_low", "_high"))
-    assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in markdown(comparison)
+    assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in text
     assert (row["unit"], row["targets"], row["verdict"]) == ("dB", "3", "better")
     assert float(row["mean_b"]) - float(row["mean_a"]) == pytest.approx(mean, abs=1e-3)
-
-
-def test_the_page_says_what_differs_besides_the_numbers(comparison: Comparison) -> None:
-    text = markdown(comparison)
     assert "| revision | a | b |" in text
     assert "| t2 | toy | bench | 22.00 | 22.60 | +0.600 |" in text
 

@@ -28,24 +28,15 @@ def header(path: Path) -> list[str]:
         return next(csv.reader(file))
 
 
-@pytest.mark.parametrize(
-    ("key", "expected"),
-    [
-        ("psnr_linear", "psnr_linear_db"),
-        ("psnr_linear_blur0.5", "psnr_linear_blur0.5px_db"),
-        ("ssim_srgb", "ssim_srgb"),
-        ("psnr_srgb_refined", "psnr_srgb_refined_db"),
-        ("psnr", "psnr_db"),
-        ("1-lpips", "1-lpips"),
-        ("refine_dx_px", "refine_dx_px"),
-    ],
-)
-def test_a_unit_is_the_last_part_of_a_column_and_the_key_comes_back(key: str, expected: str) -> None:
-    assert parse(key).column == expected
-    assert parse(expected) == parse(key)
-
-
-def test_a_statistic_stands_before_the_unit() -> None:
+def test_a_unit_is_the_last_part_of_a_column_and_the_key_comes_back() -> None:
+    columns_of = {
+        **{"psnr_linear": "psnr_linear_db", "psnr_linear_blur0.5": "psnr_linear_blur0.5px_db", "psnr": "psnr_db"},
+        **{"psnr_srgb_refined": "psnr_srgb_refined_db", "refine_dx_px": "refine_dx_px"},
+        **{"ssim_srgb": "ssim_srgb", "1-lpips": "1-lpips"},
+    }
+    for key, expected in columns_of.items():
+        assert parse(key).column == expected
+        assert parse(expected) == parse(key)
     assert parse("psnr_linear").statistic("_lo") == "psnr_linear_lo_db"
     assert parse("ssim_linear_blur1").statistic("_hi") == "ssim_linear_blur1px_hi"
 
@@ -70,10 +61,9 @@ def test_every_metric_of_the_catalogue_has_an_entry_with_its_unit(end: str) -> N
 
 
 def test_a_column_that_the_dictionary_lacks_is_found_out() -> None:
-    assert described("records.csv", "glare") is None
-    assert described("records.csv", "psnr_linear_glare_db") is None
-    assert described("tests.csv", "psnr_linear_db") is None
-    assert described("records.csv", "psnr_linear_lo_db") is None
+    scores = ("glare", "psnr_linear_glare_db", "psnr_linear_lo_db")
+    for file, name in (("tests.csv", "psnr_linear_db"), *(("records.csv", name) for name in scores)):
+        assert described(file, name) is None
 
 
 def test_an_entry_says_what_a_difference_is_a_difference_of() -> None:
@@ -99,10 +89,8 @@ def energy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("energy")
 def test_a_figure_of_a_run_takes_one_entry(tmp_path: Path) -> None:
-    layout, records = (
-        budget.layout(),
-        [{**record, "energy": 2.5 + index} for index, record in enumerate(budget.study())],
-    )
+    layout = budget.layout()
+    records = [{**record, "energy": 2.5 + index} for index, record in enumerate(budget.study())]
     _, results = write_report(layout, records, tmp_path, {}, Description())
     cells, table = (pd.read_csv(tmp_path / name) for name in ("records.csv", "table.csv"))
     first = cells[(cells["label"] == "double_phase") & (cells["condition"] == "leto-aged")]
@@ -118,10 +106,5 @@ def test_a_figure_of_a_run_takes_one_entry(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(read_records((tmp_path / "records.csv").read_text()), results.frame)
     committed = [{"row": row} for row in results.frame.to_dict("records")]
     pd.testing.assert_frame_equal(records_frame(committed, budget.layout()), results.frame)
-
-
-@pytest.mark.usefixtures("energy")
-def test_a_figure_that_no_record_has_is_in_no_file(tmp_path: Path) -> None:
-    _, results = write_report(budget.layout(), budget.study(), tmp_path, {}, Description())
-    assert "energy_j" not in results.frame
-    assert not any("energy" in (tmp_path / name).read_text() for name in ("records.csv", "table.csv", "columns.md"))
+    without = budget.results()  # a figure that no record has is in no file
+    assert "energy_j" not in {*without.frame, *without.table}

@@ -8,7 +8,6 @@ import pytest
 from holobench_eval.metrics import error_budget as scores
 from holobench_eval.report.data.error_budget import budgets
 from holobench_eval.report.data.results import Results
-from holobench_eval.report.data.tables import records_frame
 from tests.support import synthetic_study as synthetic
 
 METHODS = ("terms", "network", "field")
@@ -21,19 +20,10 @@ LEFT = {
 
 
 def results(missing: str = "", noise: float | None = None) -> Results:
-    layout = synthetic.layout(
-        pairs=tuple((label, "ideal") for label in METHODS),
-        targets=tuple(LEFT),
-        baseline="terms",
-        privileged=frozenset(),
-        reported={},
-        measure="error_budget",
-        holograms="wirtinger (iterations = 50)",
-    )
     records = [
         record(label, target, noise) for target in LEFT for label in METHODS if (label, target) != (missing, "coffee")
     ]
-    return Results(records_frame(records, layout), layout)
+    return synthetic.results(records, baseline="terms", measure="error_budget", holograms="wirtinger (iterations = 50)")
 
 
 def record(label: str, target: str, noise: float | None = None) -> dict[str, Any]:
@@ -52,23 +42,18 @@ def record(label: str, target: str, noise: float | None = None) -> dict[str, Any
 def test_the_parts_add_up_and_the_gains_are_those_of_all_until_then() -> None:
     (budget,) = budgets(results())
     left = np.array(list(LEFT.values()))
+    assert left[1, 3] > left[1, 2]  # on one target the network does worse than the terms,
+    assert left[2, 1] > left[2, 0]  # on another the ideal image worse than the target
     assert sum(part.share.mean for part in budget.parts) == pytest.approx(1)
     gains = [part.gain.mean for part in budget.explained if part.gain]
-    best = np.minimum.accumulate(left[:, :5], axis=1)[:, 1:]
-    assert gains == pytest.approx(10 * np.log10(left[:, :1] / best).mean(0))
+    best = np.minimum.accumulate(left[:, :5], axis=1)
+    assert gains == pytest.approx(10 * np.log10(left[:, :1] / best[:, 1:]).mean(0))
     assert budget.noise.gain is not None
     assert budget.noise.gain.mean == pytest.approx(10 * np.log10(left[:, 0] / left[:, 5]).mean())
     assert budget.psnr.mean == pytest.approx(-10 * np.log10(left[:, 0]).mean())
-
-
-def test_no_part_is_negative_and_what_a_worse_prediction_leaves_alone_is_kept() -> None:
-    (budget,) = budgets(results())
-    left = np.array(list(LEFT.values()))
-    assert left[1, 3] > left[1, 2]  # on one target the network does worse than the terms,
-    assert left[2, 1] > left[2, 0]  # on another the ideal image worse than the target
-    best = np.minimum.accumulate(left[:, :5], axis=1) / left[:, :1]
-    assert [part.share.mean for part in budget.explained] == pytest.approx((-np.diff(best, axis=1)).mean(0))
-    assert all(part.share.mean >= 0 for part in budget.explained)
+    shares = [part.share.mean for part in budget.explained]
+    assert shares == pytest.approx((-np.diff(best / left[:, :1], axis=1)).mean(0))
+    assert min(shares) >= 0  # what a worse prediction leaves alone is kept, and no part is negative
     alone = [part.alone.mean for part in budget.explained if part.alone]
     assert alone == pytest.approx((left[:, 1:5] / left[:, :1]).mean(0))
 

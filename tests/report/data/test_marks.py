@@ -9,9 +9,10 @@ import pytest
 from holobench_eval.report.data.board import board
 from holobench_eval.report.data.phrases import marked
 from holobench_eval.report.data.results import Results
-from holobench_eval.report.data.tables import csv_text, read_records, records_frame
+from holobench_eval.report.data.tables import csv_text, read_records
 from holobench_eval.study.plan import REFERENCE
-from tests.support.synthetic_study import TARGETS, cell, layout, record
+from tests.support.synthetic_study import TARGETS, cell, record
+from tests.support.synthetic_study import results as of_records
 
 DISPLAY = "leto-aged"
 LABELS = ("U-Net", "Identity", "Wirtinger")
@@ -19,29 +20,15 @@ LABELS = ("U-Net", "Identity", "Wirtinger")
 
 def results(network: float, identity: float, constant: float, measure: str = "prediction", **learned: Any) -> Results:
     """A study in which every target of a row has the same PSNR [dB]."""
-    given = {"U-Net": network, "Identity": identity, "Wirtinger": 40.0}
+    rows = {"U-Net": (network, DISPLAY), "Identity": (identity, DISPLAY), "Wirtinger": (40.0, DISPLAY)}
+    trained = {"learned": {"sha256": "2" * 64, "captures": 3, "seconds": 1.0, **learned}}
     records = [
-        record(label, cell(label.lower(), target, DISPLAY), {"psnr_linear": value})
-        for label, value in given.items()
+        record(label, cell(label.lower(), target, on), {"psnr_linear": value}, **trained if label == "U-Net" else {})
+        for label, (value, on) in (rows | {"floor_constant": (constant, REFERENCE)}).items()
         for target in TARGETS
     ]
-    for one in records:
-        if one["label"] == "U-Net":
-            one["learned"] = {"sha256": "2" * 64, "captures": 3, "seconds": 1.0, **learned}
-    records += [
-        record("floor_constant", cell("floor_constant", target, REFERENCE), {"psnr_linear": constant})
-        for target in TARGETS
-    ]
-    shape = layout(
-        pairs=tuple((label, DISPLAY) for label in LABELS),
-        trained=frozenset({"U-Net", "Identity"}),
-        identities=frozenset({"Identity"}),
-        measure=measure,
-        holograms="wirtinger",
-        privileged=frozenset(),
-        reported={},
-    )
-    return Results(records_frame(records, shape), shape)
+    given = {"trained": frozenset({"U-Net", "Identity"}), "identities": frozenset({"Identity"})}
+    return of_records(records, **given, measure=measure, holograms="wirtinger")
 
 
 @pytest.mark.parametrize(
@@ -59,16 +46,14 @@ def test_a_network_that_predicts_worse_than_no_training_is_marked(
     found = results(network, identity, constant)
     assert marked(found, "U-Net", DISPLAY) == f"U-Net{mark}"
     assert marked(found, "Identity", DISPLAY) == "Identity"  # it has nothing to learn
+    pictures = results(network, identity, constant, measure="picture")
+    assert marked(pictures, "U-Net", DISPLAY) == "U-Net"  # which are not compared with predictions
     gray = {
         label: ("no better than gray",) * (value < constant)
         for label, value in zip(LABELS, (network, identity, 40), strict=True)
     }
     rows = {row.label: row.marks for row in board(found).displays[0].rows}
     assert rows == gray | {"U-Net": (*filter(None, [mark.removeprefix(", ")]), *gray["U-Net"])}
-
-
-def test_pictures_are_not_compared_with_predictions() -> None:
-    assert marked(results(17.0, 19.0, 18.0, measure="picture"), "U-Net", DISPLAY) == "U-Net"
 
 
 def test_a_fallback_stands_in_the_row_and_survives_the_file_of_records() -> None:

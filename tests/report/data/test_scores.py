@@ -1,5 +1,3 @@
-import pytest
-
 from holobench_eval.report.data.scores import order_scores, parse
 from holobench_eval.report.data.statistics import Estimate
 
@@ -9,21 +7,13 @@ def test_a_key_is_read_as_metric_domain_and_variant():
     assert (score.metric, score.domain, score.variant) == ("ms_ssim", "amplitude", "")
     assert parse("psnr_linear_refined").variant == "refined"
     assert parse("speckle_contrast").domain == ""
+    widths = {"psnr_linear_blur0.5": 0.5, "ssim_linear_blur1": 1.0, "psnr_linear": None}
+    assert {key: parse(key).blur for key in widths} == widths
 
 
-@pytest.mark.parametrize(
-    ("key", "width"), [("psnr_linear_blur0.5", 0.5), ("ssim_linear_blur1", 1.0), ("psnr_linear", None)]
-)
-def test_the_blur_width_is_read_from_the_key(key, width):
-    assert parse(key).blur == width
-
-
-@pytest.mark.parametrize("key", ["mofd_srgb", "gmsd_srgb", "lpips_alex_srgb", "flip_srgb", "speckle_contrast"])
-def test_distances_are_better_when_lower(key):
-    assert parse(key).better(0.1, 0.2)
-
-
-def test_similarities_are_better_when_higher():
+def test_distances_are_better_when_lower_and_similarities_when_higher():
+    for key in ("mofd_srgb", "gmsd_srgb", "lpips_alex_srgb", "flip_srgb", "speckle_contrast"):
+        assert parse(key).better(0.1, 0.2), key
     assert parse("psnr_linear").better(20.0, 17.0)
     assert parse("ssim_linear_blur1").better(0.6, 0.5)
 

@@ -29,15 +29,12 @@ def test_the_simulated_design_is_that_of_the_targets_in_use():
     assert sorted(map(clusters.count, set(clusters))) == sorted(IN_USE)
 
 
-@pytest.mark.parametrize("sizes", [IN_USE, IN_PAIRS])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_intervals_hold_the_true_mean_as_often_as_they_say(shape, sizes):
-    assert 0.93 <= coverage(shape, sizes, 4000) <= 0.97
-
-
-@pytest.mark.parametrize("sizes", [DESIGNS["8 alone"], DESIGNS["4 alone"]])
-def test_few_targets_widen_the_interval_and_leave_its_coverage(sizes):
-    assert 0.93 <= coverage("normal", sizes, 4000) <= 0.97
+@pytest.mark.parametrize(
+    ("shape", "design"),
+    [*itertools.product(SHAPES, ("40 alone", "28 in 15 clusters")), ("normal", "8 alone"), ("normal", "4 alone")],
+)
+def test_intervals_hold_the_true_mean_as_often_as_they_say(shape, design):
+    assert 0.93 <= coverage(shape, DESIGNS[design], 4000) <= 0.97
 
 
 def test_targets_that_are_taken_for_independent_have_intervals_that_are_too_narrow():
@@ -64,26 +61,7 @@ def test_an_interval_of_equal_clusters_is_that_of_their_means():
     assert (found.n, found.clusters) == (10, 5)
 
 
-def test_targets_counted_twice_are_no_more_evidence():
-    values = np.random.default_rng(4).normal(size=6)
-    once = mean_interval(values)
-    twice = mean_interval(np.repeat(values, 2), np.repeat(list("abcdef"), 2))
-    assert (twice.low, twice.high) == pytest.approx((once.low, once.high))
-
-
-def test_an_interval_of_equal_values_has_no_width():
-    estimate = mean_interval([0.5] * 6)
-    assert (estimate.low, estimate.mean, estimate.high) == (0.5, 0.5, 0.5)
-
-
-def test_no_interval_is_the_range_of_the_values():
-    values = np.random.default_rng(5).normal(size=(100, 4))
-    ends = np.array([[estimate.low, estimate.high] for estimate in map(mean_interval, values)])
-    range_of_each = np.stack([values.min(1), values.max(1)], axis=1)
-    assert not np.isclose(ends, range_of_each).all(1).any()
-
-
-@pytest.mark.parametrize("values", [[], [17.0], [17.0, 19.0]])
+@pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0]])
 def test_below_three_targets_there_is_no_interval(values):
     estimate = mean_interval(values)
     assert estimate.n == len(values)
@@ -91,11 +69,18 @@ def test_below_three_targets_there_is_no_interval(values):
     assert not estimate.is_clear
 
 
-def test_below_three_clusters_there_is_no_interval_and_no_test():
+def test_below_three_clusters_or_displays_there_is_no_interval_and_no_test():
     values = np.array([1.0, 2.0, 3.0, 2.0, 1.0, 2.0])
     assert np.isnan(mean_interval(values, list("aaabbb")).low)
     assert np.isnan(ratio_interval(values, values + 1, list("aaabbb")).low)
     assert np.isnan(family_p(values[None], list("aaabbb"))).all()
+    assert np.isnan([two_way(np.eye(2, 5))[1:], two_way(np.eye(5, 2))[1:]]).all()
+
+
+def test_equal_values_have_an_interval_without_width_and_no_difference_has_p_one():
+    estimate = mean_interval([0.5] * 6)
+    assert (estimate.low, estimate.mean, estimate.high) == two_way(np.full((4, 5), 0.5)) == (0.5, 0.5, 0.5)
+    assert family_p(np.zeros((1, 5))) == [1.0]
 
 
 def test_a_ratio_is_exact_at_its_ends():
@@ -144,8 +129,9 @@ def test_signs_that_are_drawn_give_nearly_the_p_values_of_all_signs(monkeypatch)
     assert (drawn > 0).all()
 
 
-@pytest.mark.parametrize(("shape", "most"), [*zip(SHAPES, (0.07, 0.1, 0.2), strict=False)])
-@pytest.mark.parametrize(("clusters", "comparisons"), [(15, 5), (40, 2)])
+@pytest.mark.parametrize(
+    ("shape", "most", "clusters", "comparisons"), zip(SHAPES, (0.07, 0.1, 0.2), (15, 40, 15), (5, 2, 5), strict=False)
+)
 def test_a_false_difference_is_shown_in_about_one_of_twenty_studies_and_in_more_of_skewed_ones(
     shape, most, clusters, comparisons
 ):
@@ -153,9 +139,8 @@ def test_a_false_difference_is_shown_in_about_one_of_twenty_studies_and_in_more_
     assert false_positives(shape, clusters, comparisons, 300) <= most
 
 
-@pytest.mark.parametrize("shape", list(SHAPES)[:2])
-def test_a_difference_over_displays_that_is_none_is_seldom_shown(shape):
-    assert false_positives(shape, 20, 1, 1000) <= 0.06
+def test_a_difference_over_displays_that_is_none_is_seldom_shown():
+    assert false_positives("skewed (gamma, skewness 1)", 20, 1, 1000) <= 0.06
 
 
 @pytest.mark.parametrize("variances", VARIANCES)
@@ -169,15 +154,6 @@ def test_an_interval_over_displays_alone_is_that_of_their_means():
     means = np.random.default_rng(16).normal(size=7)
     found = mean_interval(means)
     assert two_way(np.tile(means[:, None], 5)) == pytest.approx((found.mean, found.low, found.high))
-
-
-def test_below_three_displays_or_clusters_there_is_no_interval_over_both():
-    assert np.isnan(two_way(np.eye(2, 5))[1:]).all()
-    assert np.isnan(two_way(np.eye(5, 2))[1:]).all()
-
-
-def test_equal_differences_have_an_interval_without_width():
-    assert two_way(np.full((4, 5), 0.5)) == (0.5, 0.5, 0.5)
 
 
 @pytest.mark.parametrize("clusters", [6, 15, 40])
@@ -219,12 +195,6 @@ def test_with_few_clusters_equal_p_are_told_apart_by_t():
     assert family_p(differences)[0] < 0.02
 
 
-def test_a_comparison_of_few_clusters_costs_the_others_nothing():
-    differences = np.random.default_rng(14).normal(1, 1, size=(2, 10))
-    differences[1, 3:] = np.nan
-    assert family_p(differences)[0] == family_p(differences[:1])[0]
-
-
 def test_a_large_family_is_tested_within_two_seconds():
     differences = np.random.default_rng(15).normal(0.3, 1, size=(40, 60))
     started = time.process_time()
@@ -232,15 +202,11 @@ def test_a_large_family_is_tested_within_two_seconds():
     assert time.process_time() - started < 2
 
 
-def test_no_difference_has_p_one():
-    assert family_p(np.zeros((1, 5))) == [1.0]
-
-
 def test_a_hole_is_left_out_of_its_own_comparison_alone():
     differences = np.random.default_rng(10).normal(1, 1, size=(2, 8))
     holed = differences.copy()
     holed[1, 3:] = np.nan
-    assert family_p(holed[:1]) == pytest.approx(family_p(differences[:1]))
+    assert family_p(holed)[0] == family_p(differences[:1])[0]  # few clusters of another cost it nothing
     assert family_p(holed[1:]) == pytest.approx(family_p(differences[1:, :3]))
 
 

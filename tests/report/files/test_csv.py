@@ -13,7 +13,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, layout_of, read_records, records_frame
 from holobench_eval.report.data.comparisons import comparison_frame
-from holobench_eval.report.data.layout import Layout, Swept
+from holobench_eval.report.data.layout import Swept
 from holobench_eval.report.data.tables import of_study
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE
@@ -25,40 +25,32 @@ TARGETS = tuple(f"t{number}" for number in range(8))
 PARAMS = {"iterations": 200, "offset": None}
 
 
-def layout(**changes: object) -> Layout:
-    given = {
-        "pairs": (("wirtinger, 200", "leto-aged"), ("hil", "leto-aged")),
-        "targets": TARGETS,
-        "clusters": {target: f"photo {index // 2}" for index, target in enumerate(TARGETS)},
-        "baseline": "wirtinger, 200",
-        "privileged": frozenset(),
-        "reported": {},
-        "study": "toy",
-        "seed": 20_261_123,
-        "params": {"wirtinger, 200": PARAMS},
-        "capture_limits": {"hil": 25},
-        "panels": {"leto-aged": (192, 256)},
-    }
-    return synthetic.layout(**(given | changes))
+GIVEN = {
+    "pairs": (("wirtinger, 200", "leto-aged"), ("hil", "leto-aged")),
+    "targets": TARGETS,
+    "clusters": {target: f"photo {index // 2}" for index, target in enumerate(TARGETS)},
+    "baseline": "wirtinger, 200",
+    "study": "toy",
+    "seed": 20_261_123,
+    "params": {"wirtinger, 200": PARAMS},
+    "capture_limits": {"hil": 25},
+    "panels": {"leto-aged": (192, 256)},
+}
 
 
-def records() -> list[synthetic.Record]:
-    names = {"wirtinger, 200": "wirtinger", "hil": "hil"}
+def results(**changes: object) -> Results:
     found = [
         synthetic.record(
             label,
             synthetic.cell(name, target, "leto-aged"),
             {"psnr_linear": 17.0 + index + (label == "hil") * (0.4 * index - 0.5)},
         )
-        for label, name in names.items()
+        for label, name in (("wirtinger, 200", "wirtinger"), ("hil", "hil"))
         for index, target in enumerate(TARGETS)
     ]
     floor = synthetic.cell("floor_constant", "t0", REFERENCE)
-    return [*found, synthetic.record("floor_constant", floor, {"psnr_linear": 9.0})]
-
-
-def results(**changes: object) -> Results:
-    return Results(records_frame(records(), layout(**changes)), layout(**changes))
+    found.append(synthetic.record("floor_constant", floor, {"psnr_linear": 9.0}))
+    return synthetic.results(found, **(GIVEN | changes))
 
 
 def read(frame: pd.DataFrame) -> pd.DataFrame:
@@ -66,39 +58,18 @@ def read(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def test_a_record_says_what_it_is_without_the_config() -> None:
-    found = results()
-    row = read(found.frame).iloc[0]
-    expected = {
-        "study": "toy",
-        "measure": "picture",
-        "display": "leto-aged",
-        "condition": "leto-aged",
-        "method": "wirtinger",
-        "label": "wirtinger, 200",
-        "category": "open loop",
-        "panel_height_px": 192,
-        "panel_width_px": 256,
-        "target": "t0",
-        "cluster": "photo 0",
-        "repeat": 0,
-        "seed": 20_261_123,
-        "state": "done",
-        "psnr_linear_db": 17.0,
-    }
-    assert {name: row[name] for name in expected} == expected
-
-
-def test_a_row_of_the_table_has_the_parameters_of_its_method() -> None:
-    found = results()
-    table, records = read(found.table), read(found.frame)
-    assert json.loads(table.set_index("label").loc["wirtinger, 200", "parameters"]) == PARAMS
-    assert set(table["label"]) <= set(records["label"])
-    assert "parameters" not in records
+    row = read(results().frame).iloc[0]
+    names = ["study", "measure", "display", "condition", "method", "label", "category", "target", "cluster", "state"]
+    assert row[names].tolist() == [
+        *("toy", "picture", "leto-aged", "leto-aged", "wirtinger", "wirtinger, 200"),
+        *("open loop", "t0", "photo 0", "done"),
+    ]
+    numbers = ["panel_height_px", "panel_width_px", "repeat", "seed", "psnr_linear_db"]
+    assert row[numbers].tolist() == [192, 256, 0, 20_261_123, 17.0]
 
 
 def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:
-    found = results()
-    cells = read(found.frame).set_index("label")
+    cells = read(results().frame).set_index("label")
     assert set(cells.loc["hil", "capture_limit"]) == {25}
     assert cells.loc["wirtinger, 200", "capture_limit"].isna().all()
     assert cells.loc["floor_constant", ["category", "condition"]].tolist() == ["floor", REFERENCE]
@@ -118,24 +89,20 @@ def test_a_swept_quantity_is_a_number_with_a_unit_or_a_name() -> None:
 
 
 def test_a_ratio_has_the_unit_one_and_a_draw_its_number() -> None:
-    sweeps = (
-        Swept("laser_power", "leto-aged", ((0.5, "leto-aged, laser power 0.5 of the nominal"),)),
-        Swept("draw", "leto-aged", (("7", "leto-aged, draw 7"),)),
-    )
-    conditions = [condition for sweep in sweeps for _, condition in sweep.points]
-    made = layout(sweeps=sweeps, pairs=tuple(("hil", condition) for condition in conditions))
+    points = {"laser_power": (0.5, "leto-aged, laser power 0.5 of the nominal"), "draw": ("7", "leto-aged, draw 7")}
     found = [
         synthetic.record("hil", synthetic.cell("hil", "t0", condition, profile="leto-aged"), {"psnr_linear": 1.0})
-        for condition in conditions
+        for _, condition in points.values()
     ]
-    cells = records_frame(found, made).set_index("swept")
+    sweeps = tuple(Swept(kind, "leto-aged", (point,)) for kind, point in points.items())
+    cells = synthetic.results(found, sweeps=sweeps).frame.set_index("swept")
     assert cells.loc["laser_power", ["swept_value", "swept_unit"]].tolist() == [0.5, "1"]
     assert cells.loc["draw", ["swept_value", "swept_unit"]].tolist() == [7.0, ""]
 
 
 def test_the_plane_of_a_focal_stack_is_a_swept_quantity() -> None:
-    made = layout(planes={target: ("scene", float(index)) for index, target in enumerate(TARGETS)}, measure="focus")
-    cells = records_frame(records(), made)
+    planes = {target: ("scene", float(index)) for index, target in enumerate(TARGETS)}
+    cells = results(planes=planes, measure="focus").frame
     found = cells[cells["label"] == "hil"].set_index("target").loc["t3", ["swept", "swept_value", "swept_unit"]]
     assert found.tolist() == ["plane", 3.0, "mm"]
 
@@ -150,23 +117,15 @@ def test_committed_records_are_read_and_written_without_a_loss(report: str) -> N
     assert len(frame) > 400
 
 
-def test_targets_without_clusters_are_a_cluster_each() -> None:
-    found = results(clusters={})
-    assert (found.frame["cluster"] == found.frame["target"]).all()
-    assert read(found.table)["clusters"].iloc[0] == len(TARGETS)
-
-
-def test_the_table_leads_with_what_it_is_a_table_of() -> None:
-    table = read(results().table).set_index("label")
-    assert table.loc["hil", ["study", "method", "display", "n", "clusters"]].tolist() == [
-        "toy",
-        "hil",
-        "leto-aged",
-        8,
-        4,
-    ]
+def test_the_table_leads_with_what_it_is_a_table_of_and_has_the_parameters_of_methods() -> None:
+    found = results()
+    table = read(found.table).set_index("label")
+    first = table.loc["hil", ["study", "method", "display", "n", "clusters"]]
+    assert first.tolist() == ["toy", "hil", "leto-aged", 8, 4]
     assert table.loc["hil", "psnr_linear_db"] == pytest.approx(17 + 3.5 + 0.9)
     assert table.loc["floor_constant", "category"] == "floor"
+    assert json.loads(table.loc["wirtinger, 200", "parameters"]) == PARAMS
+    assert "parameters" not in found.frame
 
 
 def test_a_paired_test_has_the_numbers_of_the_report() -> None:
@@ -190,26 +149,15 @@ def test_the_tests_of_a_study_without_a_baseline_are_a_heading_alone() -> None:
 
 
 HOSTILE = [
-    "=1+1",
-    "+cmd|' /C calc'!A0",
-    "-2",
-    "@SUM(A1)",
-    "\t=1",
-    "'=1",
-    "''@x",
-    "＝1",
-    "a|b",
-    "<script>alert(1)</script>",
-    'say "=x", please',
-    "'plain'",
+    *("=1+1", "+cmd|' /C calc'!A0", "-2", "@SUM(A1)", "\t=1", "'=1", "''@x", "＝1", "a|b", "<script>alert(1)</script>"),
+    *('say "=x", please', "'plain'"),
 ]
 
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_text_is_never_a_formula_and_comes_back_as_it_was(name: str) -> None:
-    made = layout(pairs=((name, "leto-aged"),), targets=(name,), clusters={name: "="}, baseline=None)
     found = [synthetic.record(name, synthetic.cell(name, name, "leto-aged"), {"psnr_linear": -1.5})]
-    text = csv_text(records_frame(found, made))
+    text = csv_text(synthetic.results(found, clusters={name: "="}, baseline=None).frame)
     cells = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False).iloc[0]
     written = [cells[column] for column in ("method", "label", "target", "cluster")]
     assert not any(value.lstrip()[:1] in tuple("=+-@＝＋－＠") for value in written)
@@ -222,15 +170,9 @@ def test_the_name_of_a_column_is_never_a_formula() -> None:
     assert csv_text(pd.DataFrame({"=1+1": [-1.5], "n": [2]})) == "'=1+1,n\n-1.5,2\n"
 
 
-def test_a_number_that_is_none_is_refused_by_the_name_of_its_column() -> None:
-    found = results()
-    text = csv_text(found.frame)
+def test_a_number_that_is_none_or_lacks_is_refused_by_the_name_of_its_column() -> None:
+    found = results().frame
     with pytest.raises(UserError, match=r"records.csv, column solving_s: could not convert"):
-        read_records(text.replace(",done,,17,0,,", ",done,,17,0,soon,"))
-
-
-def test_a_column_that_lacks_is_named_as_in_the_file() -> None:
-    found = results()
-    lacking = found.frame.drop(columns="solving_s")
+        read_records(csv_text(found).replace(",done,,17,0,,", ",done,,17,0,soon,"))
     with pytest.raises(UserError, match="lacks the columns solving_s"):
-        read_records(csv_text(lacking))
+        read_records(csv_text(found.drop(columns="solving_s")))

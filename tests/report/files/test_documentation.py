@@ -18,43 +18,29 @@ EXAMPLES = re.findall(
 )
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files of Table 3, written from its committed records."""
-    root = tmp_path_factory.mktemp("root")
-    report = root / "reports" / "table3"
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The files of Table 3, written from its committed records, in the working folder."""
+    report = tmp_path / "reports" / "table3"
     report.mkdir(parents=True)
     records = read_records((ROOT / "reports" / "table3" / "records.csv").read_text())
     write_files(Results(records, layout_of(load_study(ROOT / "configs" / "table3.yaml"))), report)
-    return root
+    monkeypatch.chdir(tmp_path)
+    return report
 
 
-def printed(example: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: Path) -> str:
-    monkeypatch.chdir(folder)
-    exec(example, {})
-    return capsys.readouterr().out
-
-
-def test_every_example_is_three_lines_beside_the_import() -> None:
-    assert len(EXAMPLES) == 2
+def test_the_examples_print_the_differences_of_each_display_and_every_test_of_a_method(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed = []
     for example in EXAMPLES:
         assert len([line for line in example.splitlines() if line and not line.startswith("import")]) <= 3
-
-
-def test_the_differences_of_the_first_example_are_those_of_the_tests_of_each_display(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = printed(EXAMPLES[0], monkeypatch, capsys, folder)
-    tests = pd.read_csv(folder / "reports" / "table3" / "tests.csv").query("label == 'hil'").set_index("condition")
+        exec(example, {})
+        printed.append(capsys.readouterr().out)
+    differences, every = printed
+    tests = pd.read_csv(folder / "tests.csv").query("label == 'hil'").set_index("condition")
     assert len(tests) > 1
     for condition, difference in tests["difference_db"].items():
-        (value,) = re.findall(rf"^{condition}\s+(\S+)$", text, re.MULTILINE)
+        (value,) = re.findall(rf"^{condition}\s+(\S+)$", differences, re.MULTILINE)
         assert float(value) == pytest.approx(difference, abs=2e-5)
-
-
-def test_the_second_example_prints_every_test_of_the_method(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = printed(EXAMPLES[1], monkeypatch, capsys, folder)
-    tests = pd.read_csv(folder / "reports" / "table3" / "tests.csv").query("label == 'hil'")
-    assert [line.split()[1] for line in text.splitlines() if re.match(r"\d", line)] == tests["condition"].tolist()
+    assert [line.split()[1] for line in every.splitlines() if re.match(r"\d", line)] == tests.index.tolist()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ DELAY = 400  # ms after which the address holds a new view
 class Reader:
     """A page of a browser, with what went wrong and what was asked of the network."""
 
-    def __init__(self, page: Any, file: Path) -> None:
-        self.page, self.file = page, file
+    def __init__(self, page: Any, address: str) -> None:
+        self.page, self.address = page, address
         page.set_default_timeout(10_000)
         self.wrong: list[str] = []
         self.asked: list[str] = []
@@ -25,10 +26,28 @@ class Reader:
         page.on("request", lambda request: self.asked.append(request.url))
         page.on("dialog", lambda dialog: self.wrong.append(dialog.message))
 
-    def open(self, view: str = "") -> Reader:
+    def open(self, rest: str = "") -> Reader:
+        """Load the address with what comes after it."""
         self.page.goto("about:blank")
         self.asked.clear()
-        self.page.goto(f"{self.file.as_uri()}{view}")
+        self.page.goto(f"{self.address}{rest}")
+        return self
+
+
+@contextmanager
+def reading(reader: Reader, rest: str = "") -> Iterator[None]:
+    """The address is open, and nothing has gone wrong in the end."""
+    reader.open(rest)
+    yield
+    assert not reader.wrong
+    reader.page.close()
+
+
+class ReportReader(Reader):
+    """A reader of a report's page."""
+
+    def open(self, rest: str = "") -> ReportReader:
+        super().open(rest)
         self.page.wait_for_function("() => document.getElementById('panes').getAttribute('aria-label')")
         return self
 

@@ -54,9 +54,6 @@ def test_a_report_is_question_answer_board_plot_pictures_and_limits(page: str) -
     places = [page.index(text) for text in order]
     assert places == sorted(places)
     assert len(page.splitlines()) <= 80
-
-
-def test_the_question_is_text_whatever_it_holds(page: str) -> None:
     assert "Is HIL &lt;script>alert(1)&lt;/script> \\| better \\| =cmd? # No heading" in page
     assert "<script" not in page
 

@@ -67,25 +67,15 @@ def test_methods_that_lack_the_same_are_told_once() -> None:
     [
         {},
         {"estimates": "many", "missing": "much"},
-        {
-            "estimates": [1, {"name": 2, "value": 1.0}, {"name": "x"}, {"name": "x", "value": 1, "colour": []}],
-            "missing": [1],
-        },
-        {"estimates": [{"name": "x", "value": math.nan, "colour": 0}, {"name": "x", "value": True}]},
+        {"estimates": [1, {"name": 2, "value": 1.0}, {"name": "x"}, {"name": "x", "value": 1, "colour": []}]},
+        {"estimates": [{"name": "x", "value": math.nan, "colour": 0}, {"name": "x", "value": True}], "missing": [1]},
         {"estimates": [{"name": "x", "value": 10**400, "colour": 0}]},
     ],
 )
 def test_provenance_of_strangers_shows_nothing_and_stops_nothing(facts: dict[str, object]) -> None:
-    assert diagnoses([trained(**facts)]) == []
-    assert missing([trained(**facts)]) == []
+    assert (diagnoses([trained(**facts)]), missing([trained(**facts)])) == ([], [])
     unknown = Training("x", ("x",), "y", None)
     assert (diagnoses([unknown]), missing([unknown])) == ([], [])
-
-
-def test_the_only_laser_has_no_column_of_its_own() -> None:
-    rows = [{"name": "hue_of", "value": 2, "colour": 0}, {"name": "width", "value": 1.0, "colour": None}]
-    ((_, shown, _),) = diagnoses([trained(estimates=rows)])
-    assert lines(shown)[0] == ["quantity", "unit", "all", "largest difference", "stated error"]
 
 
 def test_numbers_of_a_stranger_are_shown_with_what_is_known_of_them() -> None:
@@ -95,3 +85,6 @@ def test_numbers_of_a_stranger_are_shown_with_what_is_known_of_them() -> None:
     assert header == ["quantity", "unit", "colour 7", "all", "largest difference", "stated error"]
     assert hue == ["hue of", "", "1.000 (–)", "2.000 (–)", "–", "–"]
     assert verdict.startswith("None of these")
+    rows = [{"name": "hue_of", "value": 2, "colour": 0}, {"name": "width", "value": 1.0, "colour": None}]
+    ((_, shown, _),) = diagnoses([trained(estimates=rows)])  # the only laser has no column of its own
+    assert lines(shown)[0] == ["quantity", "unit", "all", "largest difference", "stated error"]

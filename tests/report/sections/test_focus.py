@@ -7,10 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from holobench_eval.report import Description, Results, records_frame
+from holobench_eval.report import Description, Results
 from holobench_eval.report.charts.thumbnails import noted
 from holobench_eval.report.data.scores import parse
-from holobench_eval.report.data.text import BY_MEASURE
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.focus import SECTIONS, by_plane
 from tests.support import synthetic_study as synthetic
@@ -27,31 +26,12 @@ def results_of(quality: dict[str, float], noise: float = 0.2, **changes: Any) ->
     for label, mean in quality.items():
         for index, (target, (_, plane)) in enumerate(PLANES.items()):
             value = mean - (abs(plane) if label == "joint" else 0.0) + noise * (index % 3)
-            scores = {
-                "psnr_linear": value + 1,
-                "psnr_linear_blur1": value + 2,
-                "psnr_linear_infocus": value,
-                "ssim_linear_infocus": 0.5,
-            }
+            scores = {"psnr_linear": value + 1, "psnr_linear_blur1": value + 2}
+            scores |= {"psnr_linear_infocus": value, "ssim_linear_infocus": 0.5}
             described = synthetic.cell(label, target, "bench", measure="focus")
             records.append(synthetic.record(label, described, scores, seconds=SECONDS[label]))
-    given = {
-        "pairs": tuple((label, "bench") for label in quality),
-        "targets": tuple(PLANES),
-        "headline": "psnr_linear_infocus",
-        "baseline": "lens",
-        "measure": "focus",
-        "planes": PLANES,
-        "stacked": frozenset({"joint"}),
-        "privileged": frozenset(),
-        "reported": {},
-    }
-    layout = synthetic.layout(**(given | changes))
-    return Results(records_frame(records, layout), layout)
-
-
-def report_of(results: Results, output: Path) -> Report:
-    return Report(results, [], output, {}, Description())
+    given = {"headline": "psnr_linear_infocus", "baseline": "lens", "measure": "focus", "planes": PLANES}
+    return synthetic.results(records, **(given | {"stacked": frozenset({"joint"})} | changes))
 
 
 def lines(text: str) -> list[list[str]]:
@@ -69,8 +49,9 @@ def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_sce
 
 def test_other_studies_have_no_such_section() -> None:
     (section,) = SECTIONS
-    assert section.applies(report_of(results_of({"lens": 20.0}), Path()))
-    assert not section.applies(report_of(results_of({"lens": 20.0}, planes={}), Path()))
+    for planes in (PLANES, {}):
+        results = results_of({"lens": 20.0}, planes=planes)
+        assert section.applies(Report(results, [], Path(), {}, Description())) == bool(planes)
 
 
 def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
@@ -80,7 +61,3 @@ def test_scores_in_focus_are_named_so_and_lead_the_tables() -> None:
     scores = [parse(key) for key in leading[:2]]
     cell = pd.Series({score.column: value for score, value in zip(scores, (16.384, 0.4), strict=True)})
     assert noted(scores, cell) == "in focus: PSNR 16.38 dB   SSIM 0.400"
-
-
-def test_the_words_say_what_the_display_does() -> None:
-    assert "adds the phase of a lens" in BY_MEASURE["focus"].procedure

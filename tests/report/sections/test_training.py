@@ -2,14 +2,18 @@ import json
 import math
 import re
 
-import numpy as np
 import pytest
 
 from holobench_eval.core.hashing import digest
-from holobench_eval.report import Results, csv_text, recompute_files, records_frame, table_from_records, write_report
+from holobench_eval.report import Results, records_frame, table_from_records, write_report
+from holobench_eval.report.answers import kind_of
+from holobench_eval.report.answers.limits import limits
 from holobench_eval.report.charts.training import MOST, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
+from holobench_eval.report.markdown import blocks
+from holobench_eval.report.section import Report
+from holobench_eval.report.sections.training import SECTIONS
 from holobench_eval.study.artifacts import Round, rounds_of
 from tests.support import synthetic_study as synthetic
 from tests.support.reports import whole
@@ -69,9 +73,15 @@ def written(found, tmp_path, **changes):
     return whole(write_report(layout(**changes), found, tmp_path, {}, Description())[0])
 
 
-def rows_under(text, heading):
-    part = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in part.splitlines() if line[:1] == "|"]
+def report_of(found, folder, **changes):
+    results = Results(records_frame(found, layout(**changes)), layout(**changes))
+    return Report(results, found, folder, {}, Description())
+
+
+def section_of(found, folder):
+    """The text of the section alone, and the files of its figures."""
+    (section,), report = SECTIONS, report_of(found, folder)
+    return str(blocks(section.render(report, []))), [path for path, _ in section.figures(report)]
 
 
 def test_captures_for_training_are_told_apart_from_those_while_solving(found):
@@ -86,8 +96,6 @@ def test_captures_for_training_are_told_apart_from_those_while_solving(found):
     assert holes["training_captures"].isna().all()
     table = table_from_records(frame, layout())
     assert table.set_index("label").loc["HIL", "learned_sha256"] == "hil" * 16
-    written_records = csv_text(frame)
-    assert recompute_files(written_records, layout())["table.csv"] == csv_text(Results(frame, layout()).table)
 
 
 def test_a_study_without_training_has_neither_its_columns_nor_its_section(found, tmp_path):
@@ -102,28 +110,28 @@ def test_a_study_without_training_has_neither_its_columns_nor_its_section(found,
 def test_every_round_is_listed_with_its_figures_on_held_out_images(found, tmp_path):
     keep(tmp_path, "hil", perceptual="oriented filters")
     keep(tmp_path, "unet")
-    text = written(found, tmp_path)
+    text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
     assert "| HIL | leto-aged | 140 | 3600 | 20 | 4 | 2 | oriented filters | hilhilhilh |" in text
     assert "| HIL | 1 | 16 | 120 | 20.50 | 12.70 | 14.70 |" in text
     assert "| U-Net | 2 | 24 | 200 | 21.25 | 15.50 | 18.12 |" in text
     assert "(figures/training-1.png)" in text
     assert (tmp_path / "figures" / "training-1.png").is_file()
     assert "24 of dead_leaves (count = 24, seed = 0), of which 4 only watch the training; at most 200 captures" in text
+    note = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
+    assert text.index("\n## Limits\n") < note
 
 
 def test_a_training_that_is_not_beside_the_report_or_not_the_right_one_is_said(found, tmp_path):
-    keep(tmp_path, "hil", sha256="another")
-    text = written(found, tmp_path)
+    keep(tmp_path, "hil", sha256="another", perceptual="<img src=x onerror=alert(1)> | [l](javascript:1)")
+    text, _ = section_of(found, tmp_path)
     assert "The figures for HIL here and its scores come from different trainings." in text
     assert "Nothing is known of the training of U-Net" in text
-    assert "| U-Net | leto-aged | – | – | 20 | 4 | – | not trained |" in text
-
-
-def test_scores_of_two_trainings_in_one_row_are_said(found, tmp_path):
-    keep(tmp_path, "hil")
+    assert "| U-Net | leto-aged | – | – | 20 | 4 | – | none | not trained |" in text
+    assert "<img" not in text  # names of strangers stay text
+    assert not re.search(r"(?<!\\)\]\(javascript", text)
     first = next(index for index, record in enumerate(found) if record["label"] == "HIL")
     mixed = [*found[:first], trained(found[first], "hil", sha256="other"), *found[first + 1 :]]
-    assert "The scores of HIL come from 2 different trainings." in written(mixed, tmp_path)
+    assert "The scores of HIL come from 2 different trainings." in section_of(mixed, tmp_path)[0]
 
 
 @pytest.mark.parametrize(
@@ -134,9 +142,9 @@ def test_logs_of_strangers_show_nothing_and_stop_nothing(found, tmp_path, log):
     keep(tmp_path, "hil", log=log)
     (tmp_path / "training" / "broken.json").write_text("{")
     (tmp_path / "training" / "list.json").write_text("[]")
-    text = written(found, tmp_path)
+    text, figures = section_of(found, tmp_path)
     assert "No figures on held-out images were logged." in text
-    assert not list((tmp_path / "figures").glob("training-*.png"))
+    assert figures == []
 
 
 def logged(folder, log):
@@ -161,18 +169,10 @@ def test_few_trainings_have_a_panel_each_and_many_are_left_to_the_table(tmp_path
     assert draw_trainings(tmp_path / "none", [("m", ())]) == []
 
 
-def prediction(**changes):
-    return {
-        "measure": "prediction",
-        "holograms": "wirtinger (iterations = 200)",
-        "pairs": PAIRS[1:],
-        "baseline": "HIL",
-    } | changes
-
-
 def test_a_prediction_study_never_speaks_of_picture_quality(found, tmp_path):
     records = [record for record in found if record["label"] != "GS"]
-    text = written(records, tmp_path / "report", **prediction())
+    holograms = "wirtinger (iterations = 200)"
+    text = written(records, tmp_path, measure="prediction", holograms=holograms, pairs=PAIRS[1:], baseline="HIL")
     for phrase in (
         "HIL predicts best (",
         "It does not measure picture quality",
@@ -183,19 +183,6 @@ def test_a_prediction_study_never_speaks_of_picture_quality(found, tmp_path):
     assert "captures while solving" not in text
 
 
-def test_predictions_on_another_display_are_not_set_beside_captures_of_the_first(found, tmp_path):
-    records = [record for record in found if record["label"] != "GS"]
-    elsewhere = [
-        record | {"cell": record["cell"] | {"profile": "other"}}
-        if record["cell"]["condition"] == synthetic.REFERENCE
-        else record
-        for record in records
-    ]
-    text = written(elsewhere, tmp_path, **prediction())
-    assert "Floor:" not in text
-    assert "comparison-" not in text
-
-
 def test_a_learned_display_claims_no_camera(found, tmp_path):
     name = "hil trained on leto-aged"
     moved = [
@@ -204,10 +191,9 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         if record["label"] == "HIL"
     ]
     keep(tmp_path, "hil")
-    text = written(
-        moved, tmp_path, pairs=(("HIL", name),), learned_display=name, trained=frozenset({"HIL"}), baseline=None
-    )
-    for phrase in ("circle grid", "refused.", "a capture is refused", "Stages of", "simulated benches"):
+    learned = {"pairs": (("HIL", name),), "learned_display": name, "trained": frozenset({"HIL"}), "baseline": None}
+    text = written(moved, tmp_path, **learned)
+    for phrase in ("refused.", "Stages of", "simulated benches"):
         assert phrase not in text.replace("a study in which one is a target is refused.", ""), phrase
     for phrase in (
         "| HIL and the display itself | leto-aged | 140 |",
@@ -217,30 +203,15 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         assert phrase in text, phrase
 
 
-def test_the_note_of_a_study_stands_among_its_limits_as_text(found, tmp_path):
-    text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
-    place = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
-    assert text.index("\n## Limits\n") < place
-
-
-def test_hostile_names_in_a_training_stay_text(found, tmp_path):
-    evil = "<img src=x onerror=alert(1)> | [l](javascript:1)"
-    keep(tmp_path, "hil", perceptual=evil)
-    text = written(found, tmp_path)
-    assert "<img" not in text
-    assert not re.search(r"(?<!\\)\]\(javascript", text)
-
-
 def test_two_reports_of_one_training_have_equal_bytes(found, tmp_path):
     reports = []
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         keep(tmp_path / name, "hil", made=name)
-        written(found, tmp_path / name)
-        kept = [path for path in sorted((tmp_path / name).rglob("*")) if path.is_file() and path.suffix != ".json"]
-        reports.append([path.read_bytes() for path in kept])
-    assert len(reports[0]) > 4
-    assert np.all([a == b for a, b in zip(*reports, strict=True)])
+        text, figures = section_of(found, tmp_path / name)
+        reports.append((text, [path.read_bytes() for path in figures]))
+    assert reports[0] == reports[1]
+    assert len(reports[0][1]) == 1
 
 
 def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_limits(found, tmp_path):
@@ -252,6 +223,11 @@ def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_l
     ]
     keep(tmp_path, "hil", description=described)
     keep(tmp_path, "unet")
-    text = written(records, tmp_path, question="Is HIL better than U-Net?")
+
+    def told(question):
+        report = report_of(records, tmp_path, question=question)
+        return "\n".join(limits(report, kind_of(report.results)))
+
+    text = told("Is HIL better than U-Net?")
     assert "**Weights:** without VGG-19 weights, which this machine has not, learned HIL." in text
-    assert "**Weights:**" not in written(records, tmp_path, question="Is U-Net better?")
+    assert "**Weights:**" not in told("Is U-Net better?")

@@ -18,21 +18,23 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_folder_that_looks_like_a_site_keeps_its_files(tmp_path: Path, passing: Path) -> None:
-    names = ("assets/site.css", "assets/logo.svg", "pictures/holiday.jpg", "index.html")
+@pytest.mark.parametrize(
+    ("is_site", "names"),
+    [
+        (False, ("assets/site.css", "assets/logo.svg", "pictures/holiday.jpg", "index.html")),
+        (True, ("CNAME",)),
+        (True, ("methods/mine.html",)),
+        (True, (".git/HEAD",)),
+    ],
+)
+def test_files_of_somebody_in_the_output_are_refused_and_kept(
+    tmp_path: Path, passing: Path, is_site: bool, names: tuple[str, ...]
+) -> None:
+    if is_site:
+        write_site([passing], tmp_path, OWN)
     for name in names:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("mine")
-    with pytest.raises(UserError, match="which is no file of a site"):
-        write_site([passing], tmp_path, OWN)
-    assert files(tmp_path) == dict.fromkeys(names, b"mine")
-
-
-@pytest.mark.parametrize("name", ["CNAME", "methods/mine.html", ".git/HEAD"])
-def test_what_was_added_to_a_site_is_refused_and_kept(tmp_path: Path, passing: Path, name: str) -> None:
-    write_site([passing], tmp_path, OWN)
-    (tmp_path / name).parent.mkdir(exist_ok=True)
-    (tmp_path / name).write_text("mine")
     before = files(tmp_path)
     with pytest.raises(UserError, match="which is no file of a site"):
         write_site([passing], tmp_path, OWN)
@@ -51,21 +53,14 @@ def test_nothing_is_written_through_a_link(tmp_path: Path, passing: Path, name: 
     assert (files(outside) if outside.is_dir() else outside.read_bytes()) == before
 
 
-@pytest.mark.parametrize("written", [0, 1, 5])
-@pytest.mark.parametrize("earlier", [True, False])
+@pytest.mark.parametrize(("left", "earlier"), [(0, True), (1, False), (5, True), (5, False)])
 def test_a_site_that_was_interrupted_is_written_by_the_same_command(
-    tmp_path: Path,
-    passing: Path,
-    study: list[dict[str, Any]],
-    monkeypatch: pytest.MonkeyPatch,
-    written: int,
-    earlier: bool,
+    tmp_path: Path, passing: Path, study: list[dict[str, Any]], left: int, earlier: bool
 ) -> None:
     expected, site = tmp_path / "expected", tmp_path / "site"
     write_site([passing], expected, OWN)
     if earlier:
         write_site([write_results(tmp_path / "stale", study, by="Another lab")], site, OWN)
-    left = written
 
     def full(path: Path, content: bytes) -> None:
         nonlocal left
@@ -75,7 +70,7 @@ def test_a_site_that_was_interrupted_is_written_by_the_same_command(
         left -= 1
         write(path, content)
 
-    with monkeypatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         write = build.write_atomically
         patch.setattr(build, "write_atomically", full)
         with pytest.raises(StorageError):
@@ -84,23 +79,20 @@ def test_a_site_that_was_interrupted_is_written_by_the_same_command(
     assert files(site) == files(expected)
 
 
-def test_two_files_of_one_name_are_refused(tmp_path: Path, handed_in: Path) -> None:
-    path = sorted((handed_in / "thumbnails").iterdir())[0]
-    path.with_suffix(".PNG").write_bytes(path.read_bytes())
-    with pytest.raises(UserError, match="two files of the site would have this name"):
-        write_site([handed_in], tmp_path / "site", OWN)
-
-
-def test_a_figure_and_a_thumbnail_of_one_name_are_two_files(tmp_path: Path, handed_in: Path) -> None:
+def test_two_files_of_one_name_are_refused_and_a_figure_and_a_thumbnail_of_one_are_two_files(
+    tmp_path: Path, handed_in: Path
+) -> None:
     path = sorted((handed_in / "thumbnails").iterdir())[0]
     (handed_in / "figures").mkdir()
-    (handed_in / "figures" / path.name).write_bytes(path.read_bytes())
-    (handed_in / "figures" / "Quality-a.png").write_bytes(path.read_bytes())
-    (handed_in / "figures" / "quality-A.png").write_bytes(path.read_bytes())
+    for name in (path.name, "Quality-a.png", "quality-A.png"):
+        (handed_in / "figures" / name).write_bytes(path.read_bytes())
     write_site([handed_in], tmp_path / "site", OWN)
     pictures = tmp_path / "site" / "pictures" / "theirs"
     assert len([each for each in pictures.iterdir() if each.is_file()]) == 3
     assert len(list((pictures / "captures").iterdir())) == 2
+    path.with_suffix(".PNG").write_bytes(path.read_bytes())
+    with pytest.raises(UserError, match="two files of the site would have this name"):
+        write_site([handed_in], tmp_path / "another", OWN)
 
 
 def test_labs_whose_names_differ_by_case_or_space_alone_are_refused(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from PIL import Image
 
@@ -15,7 +16,7 @@ from holobench_eval.report.site import checks, pictures, write_site
 from holobench_eval.report.site.intake import read
 from tests.support.results_folder import edited, write_results
 
-from .conftest import LAB, Site
+from .conftest import Site
 
 OWN = Path("reports")
 
@@ -55,12 +56,10 @@ def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> 
     ("column", "value", "words"),
     [
         ("psnr_linear_db", "inf", ("psnr_linear_db inf", "expected a number from -200 to 80")),
-        ("psnr_linear_db", "900", ("psnr_linear_db 900", "expected")),
         ("psnr_linear_db", "nan", ("psnr_linear_db nan", "expected a number from")),
         ("psnr_linear_db", "much", ("psnr_linear_db", "much")),
         ("ssim_linear", "1.5", ("ssim_linear 1.5", "to 1")),
         ("captures", "-1", ("captures -1", "from 0 to 1e+09")),
-        ("solving_s", "inf", ("solving_s inf", "from 0 to")),
         ("state", "won", ("state 'won'", "done, failed")),
         ("state", "failed", ("is not done and has a score",)),
         ("category", "best", ("category 'best'", "open loop")),
@@ -87,8 +86,6 @@ def test_a_wrong_cell_is_refused(handed_in: Path, column: str, value: str, words
 
 def without(*names: str) -> Callable[[Path], None]:
     def change(folder: Path) -> None:
-        import pandas as pd
-
         frame = pd.read_csv(folder / "records.csv", dtype=str, keep_default_na=False)
         frame.drop(columns=list(names)).to_csv(folder / "records.csv", index=False)
 
@@ -238,19 +235,18 @@ def test_own_is_what_lies_below_the_folder_of_own_reports_and_names_nobody(
         read(ours, tmp_path / "others")
 
 
-def test_one_bad_folder_among_good_ones_stops_the_site(site: Site, tmp_path: Path, study: list[dict[str, Any]]) -> None:
-    write_results(tmp_path / "all" / "good", study)
-    bad = write_results(tmp_path / "all" / "bad", study)
+def test_a_folder_without_records_is_named_and_a_bad_one_among_good_ones_stops_the_site(
+    tmp_path: Path, study: list[dict[str, Any]]
+) -> None:
+    own, site = tmp_path / "all", tmp_path / "site"
+    write_results(own / "good", study)
+    (own / "timings").mkdir()
+    assert write_site([own], site, own) == (1, [own / "timings"])
+    assert "timings: no records.csv, left out" in (site / "index.html").read_text()
+    bad = write_results(own / "bad", study)
     (bad / "records.csv").unlink()
     with pytest.raises(UserError, match=r"bad/records.csv: missing"):
-        write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all")
-
-
-def test_a_folder_without_records_is_named(tmp_path: Path, study: list[dict[str, Any]]) -> None:
-    write_results(tmp_path / "all" / "good", study)
-    (tmp_path / "all" / "timings").mkdir()
-    assert write_site([tmp_path / "all"], tmp_path / "site", tmp_path / "all") == (1, [tmp_path / "all" / "timings"])
-    assert "timings: no records.csv, left out" in (tmp_path / "site" / "index.html").read_text()
+        write_site([own], site, own)
 
 
 def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: Path) -> None:
@@ -259,7 +255,3 @@ def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: 
         with pytest.raises(UserError, match=word):
             write_site([site.own], output, site.own)
     assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
-
-
-def test_whose_result_it_is_stands_in_the_provenance(site: Site) -> None:
-    assert (read(site.own, site.own).by, read(site.other, site.own).by) == ("", LAB)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -13,44 +12,21 @@ import pytest
 
 from holobench_eval.report.site import write_site
 from holobench_eval.report.site.html import slug
+from tests.report.elements import Elements
 from tests.support.results_folder import write_results
 
 from .conftest import HOSTILE, LAB, OTHER, PATH, THEIRS, Site
 
 
-class Elements(HTMLParser):
-    """The elements of a page, its text, and its links."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ""
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
-
-    @property
-    def addresses(self) -> list[str]:
-        return [str(given[name]) for _, given in self.found for name in ("href", "src") if given.get(name)]
-
-    @property
-    def ids(self) -> set[str]:
-        return {str(given["id"]) for _, given in self.found if "id" in given}
-
-
 @pytest.fixture(scope="module")
 def pages(site: Site) -> dict[Path, Elements]:
-    return {path: Elements(path) for path in sorted(site.output.rglob("*.html"))}
+    return {path: Elements(path.read_text(encoding="utf-8")) for path in sorted(site.output.rglob("*.html"))}
 
 
 def test_every_link_leads_to_a_file_of_the_site(site: Site, pages: dict[Path, Elements]) -> None:
     followed = 0
     for path, page in pages.items():
-        for address in page.addresses:
+        for address in page.values("href", "src"):
             parts = urlsplit(address)
             if address == "data:,":
                 continue
@@ -60,7 +36,7 @@ def test_every_link_leads_to_a_file_of_the_site(site: Site, pages: dict[Path, El
             assert there.is_file(), address
             assert there.is_relative_to(site.output)
             if parts.fragment:
-                assert parts.fragment in pages[there].ids
+                assert parts.fragment in pages[there].values("id")
             followed += 1
     assert followed > 100
 
@@ -74,23 +50,20 @@ def test_there_is_a_page_for_every_method_display_and_study(site: Site) -> None:
     assert found == wanted | {"index.html"}
 
 
-def test_names_open_no_element_and_become_no_path(site: Site, pages: dict[Path, Elements]) -> None:
+def test_names_open_no_element_and_become_no_path_and_the_policy_lets_nothing_in(
+    site: Site, pages: dict[Path, Elements]
+) -> None:
     for page in pages.values():
         assert not {"i", "u", "b", "img", "iframe", "script"} & {tag for tag, _ in page.found}
-        assert not [given for _, given in page.found if any(name.startswith("on") or name == "style" for name in given)]
+        assert page.opens_nothing()
+        assert page.policy.startswith("default-src 'none';")
+        assert "unsafe" not in page.policy
+        assert "http" not in page.policy
     index = pages[site.output / "index.html"]
     for name in (LAB, THEIRS, PATH):
         assert name in index.text
     assert HOSTILE in pages[site.output / "displays" / "leto-aged.html"].text
     assert all(path.resolve().is_relative_to(site.output) for path in site.output.rglob("*"))
-
-
-def test_the_policy_lets_nothing_but_the_files_of_the_site_in(pages: dict[Path, Elements]) -> None:
-    for page in pages.values():
-        policy = next(str(given["content"]) for _, given in page.found if "http-equiv" in given)
-        assert policy.startswith("default-src 'none';")
-        assert "unsafe" not in policy
-        assert "http" not in policy
 
 
 def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(
@@ -112,16 +85,8 @@ def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(
 
 def test_a_board_has_methods_in_groups_best_first_with_letters_and_differences(site: Site) -> None:
     page = site.text("displays/leto-aged.html")
-    order = [
-        "With photographs of the picture itself",
-        ">HIL<",
-        "No camera",
-        ">Wirtinger<",
-        ">GS, ",
-        "Knows the display",
-        ">Oracle<",
-    ]
-    places = [page.index(text) for text in order]
+    order = ["With photographs of the picture itself", ">HIL<", "No camera", ">Wirtinger<", ">GS, "]
+    places = [page.index(text) for text in (*order, "Knows the display", ">Oracle<")]
     assert places == sorted(places)
     assert "GS, 3 of 4 targets" in page
     assert '<path class="mean"' in page
@@ -129,37 +94,34 @@ def test_a_board_has_methods_in_groups_best_first_with_letters_and_differences(s
     assert "Study <a" in page
 
 
-def test_a_method_with_other_settings_or_captures_is_a_row_of_its_own(
+def test_a_method_with_other_settings_is_a_row_of_its_own_and_one_without_any_score_says_so(
     tmp_path: Path, study: list[dict[str, Any]]
 ) -> None:
     """Rows are told apart by their labels: a budget of 12 captures is not a further run of one of 200."""
-    more = [
-        record | {"label": "HIL, 12", "cell": record["cell"] | {"captures": 12}}
-        for record in study
-        if record["label"] == "HIL"
-    ]
-    write_site([write_results(tmp_path / "ours", [*study, *more])], tmp_path / "site", tmp_path)
+    hil = [record for record in study if record["label"] == "HIL"]
+    more = [record | {"label": "HIL, 12", "cell": record["cell"] | {"captures": 12}} for record in hil]
+    lost = {"state": "failed", "scores": {}, "reason": "no light"}
+    records = [record | (lost if record["label"] == "SGD" else {}) for record in (*study, *more)]
+    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "methods" / "hil.html").read_text()
     assert page.count("A HIL: ") == page.count("A HIL, 12: ") == 2
-
-
-def test_a_row_without_any_score_says_so(tmp_path: Path, study: list[dict[str, Any]]) -> None:
-    records = [
-        record | ({"state": "failed", "scores": {}, "reason": "no light"} if record["label"] == "SGD" else {})
-        for record in study
-    ]
-    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "displays" / "leto-aged.html").read_text()
     assert "SGD, 0 of 4 targets</a></th>\n<td>–</td>" in page
 
 
-def test_only_studies_that_ask_for_it_enter_the_displays_and_all_have_a_page(
+def test_only_studies_that_ask_for_it_enter_the_displays_and_the_question_of_each_is_text(
     tmp_path: Path, study: list[dict[str, Any]]
 ) -> None:
-    write_site([write_results(tmp_path / "ours", study, known={"board": False})], tmp_path / "site", tmp_path)
-    assert not (tmp_path / "site" / "displays").exists()
-    assert "No study says" in (tmp_path / "site" / "index.html").read_text()
-    assert (tmp_path / "site" / "studies" / "ours.html").is_file()
+    folder, site = write_results(tmp_path / "ours", study, known={"board": False}), tmp_path / "site"
+    (folder / "board.json").write_text(json.dumps({"question": "Is it <b>better</b>?"}))
+    write_site([folder], site, tmp_path)
+    assert not (site / "displays").exists()
+    assert "No study says" in (site / "index.html").read_text()
+    for name in ("index.html", "studies/ours.html"):
+        assert "Is it &lt;b&gt;better&lt;/b&gt;?" in (site / name).read_text()
+    (folder / "board.json").write_text("[1")
+    write_site([folder], site, tmp_path)
+    assert "Is it" not in (site / "index.html").read_text()
 
 
 def test_a_display_of_another_version_has_a_page_of_its_own(tmp_path: Path, study: list[dict[str, Any]]) -> None:
@@ -167,14 +129,3 @@ def test_a_display_of_another_version_has_a_page_of_its_own(tmp_path: Path, stud
     write_site([write_results(tmp_path / "ours", study, known=known)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "displays" / f"{slug('ideal (22222222)')}.html").read_text()
     assert "Another display, or another version of one" in page
-
-
-def test_the_question_of_an_own_study_is_shown_as_text(tmp_path: Path, study: list[dict[str, Any]]) -> None:
-    folder = write_results(tmp_path / "ours", study)
-    (folder / "board.json").write_text(json.dumps({"question": "Is it <b>better</b>?"}))
-    write_site([folder], tmp_path / "site", tmp_path)
-    for name in ("index.html", "studies/ours.html"):
-        assert "Is it &lt;b&gt;better&lt;/b&gt;?" in (tmp_path / "site" / name).read_text()
-    (folder / "board.json").write_text("[1")
-    write_site([folder], tmp_path / "site", tmp_path)
-    assert "Is it" not in (tmp_path / "site" / "index.html").read_text()

@@ -48,7 +48,7 @@ def with_helper(body: str, top: str = "", text: str = SCALED, file: str = "helpe
 WRAPPED = """import functools
 
 def scaling(function):
-    {wraps}
+    @functools.wraps(function)
     def solve(self, target, bench):
         return 1.0 * function(self, target, bench)
     return solve
@@ -56,11 +56,8 @@ def scaling(function):
 DECORATED = "    @scaling\n    def solve(self, target, bench):\n        return target\n"
 
 FORMS = {
-    "plain function": Form("def Mine(target, bench):\n    return 1.0 * target\n"),
-    "method": of_class("    def solve(self, target, bench):\n        return 1.0 * target\n"),
     "staticmethod": of_class("    @staticmethod\n    def solve(target, bench):\n        return 1.0 * target\n"),
-    "classmethod": of_class("    @classmethod\n    def solve(cls, target, bench):\n        return 1.0 * target\n"),
-    "lru_cache": of_class(
+    "lru_cache": of_class(  # which does not tell its arguments
         "    @functools.lru_cache\n    def solve(self, target, bench):\n        return 1.0 * target\n"
     ),
     "partialmethod": of_class(
@@ -77,27 +74,11 @@ FORMS = {
     ),
     "helper, absolute": with_helper(SOLVE, "from helper import scaled"),
     "helper, relative": with_helper(SOLVE, "from .helper import scaled"),
-    "helper of a package": with_helper(SOLVE, "from lab.deep.helper import scaled", file="lab/deep/helper.py"),
-    "helper by importlib": with_helper(
-        SOLVE, "import importlib\nscaled = importlib.import_module('help' + 'er').scaled"
-    ),
-    "helper by its path": with_helper(
-        SOLVE,
-        "from importlib.util import module_from_spec, spec_from_file_location\nfrom pathlib import Path\n"
-        "spec = spec_from_file_location('odd', Path(__file__).parent / 'helper.py')\n"
-        "module = module_from_spec(spec)\nspec.loader.exec_module(module)\nscaled = module.scaled",
-    ),
-    "helper inside solve": with_helper(
-        "    def solve(self, target, bench):\n        from helper import scaled\n        return scaled(target)\n"
-    ),
     "helper inside solve, by a name that is put together": with_helper(
         "    def solve(self, target, bench):\n        import importlib\n"
         "        return importlib.import_module('help' + 'er').scaled(target)\n"
     ),
-    "decorator without wraps": with_helper(DECORATED, "from helper import scaling", WRAPPED.format(wraps="")),
-    "decorator with wraps": with_helper(
-        DECORATED, "from helper import scaling", WRAPPED.format(wraps="@functools.wraps(function)")
-    ),
+    "decorator with wraps": with_helper(DECORATED, "from helper import scaling", WRAPPED),
     "weights at import": with_helper(
         "    def solve(self, target, bench):\n        return WEIGHT * target\n",
         "from pathlib import Path\nWEIGHT = eval(Path(__file__).with_name('weights.txt').read_text())\n",
@@ -115,11 +96,7 @@ FORMS = {
         "    code_version: ClassVar[str] = 'mine'\n    version: ClassVar[int] = 1\n"
         "    def solve(self, target, bench):\n        return 1.0 * target\n"
     ),
-    "docstring": of_class(
-        "    def solve(self, target, bench):\n        '1.0 * 1'\n        return eval(Mine.solve.__doc__) * target\n"
-    ),
-    "default argument": Form("def Mine(target, bench, scale: float = 1.0 * 1):\n    return scale * target\n"),
-    "constant of the module": Form("SCALE = 1.0 * 1\n\ndef Mine(target, bench):\n    return SCALE * target\n"),
+    "function with a parameter": Form("def Mine(target, bench, scale: float = 1.0 * 1):\n    return scale * target\n"),
 }
 
 
@@ -172,12 +149,9 @@ def test_an_edit_makes_another_method_inside(name: str, tmp_path: Path) -> None:
     "name",
     [
         "subclass that sets a class variable",
-        "helper, relative",
-        "helper of a package",
         "helper inside solve, by a name that is put together",
         "weights at import",
         "weights in solve",
-        "code_version",
     ],
 )
 def test_an_edit_makes_another_method_apart(name: str, tmp_path: Path) -> None:
@@ -203,7 +177,7 @@ PARTS = {  # where a number may be
 }
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(st.data())
 def test_any_token_that_is_edited_makes_another_method(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
@@ -240,11 +214,6 @@ def test_what_is_refused_says_why(tmp_path: Path) -> None:
     write(tmp_path, of_class(SOLVE, "from ..above import scaled"))
     with pytest.raises(UserError, match=r"mine.py:Mine'.*attempted relative import beyond top-level package"):
         inside(tmp_path)
-
-
-def test_the_version_of_a_user_is_a_label(tmp_path: Path) -> None:
-    write(tmp_path, FORMS["code_version"])
-    assert len(method_version(type(inside(tmp_path)))) == 64
 
 
 LIBRARY = "def late():\n    import beside_\n    return beside_.NAME\n"

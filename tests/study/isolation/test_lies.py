@@ -63,6 +63,7 @@ RESULTS: dict[str, list[Any]] = {
     "external": [3, [], {"a": 3}, {3: "a"}, {"a": "\0"}],
 }
 NUMBERS = ["x", 10**30, None, [1], math.nan]
+Lie = Callable[[Callable[[Any], Any]], None]
 RECEIVE, SEND = Channel.receive, Channel.send
 
 
@@ -81,7 +82,7 @@ def use(folder: Path) -> None:
 
 
 @pytest.fixture
-def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Any], Any]], None]:
+def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lie:
     """Use a method whose process tells something else, as a function makes it of what it really tells."""
     (tmp_path / "mine.py").write_text(METHOD)
 
@@ -92,31 +93,31 @@ def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[
     return used
 
 
-def test_the_truth_is_taken(lie: Callable[[Callable[[Any], Any]], None]) -> None:
+def test_the_truth_is_taken(lie: Lie) -> None:
     asked = list[Any]()
     lie(lambda told: asked.append(told) or told)
     assert any(isinstance(told, dict) and told.get("name") == "Mine" for told in asked)
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in FACTS.items() for value in values])
-def test_facts_that_cannot_be(name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
-    with pytest.raises(UserError, match=r"method 'mine.py:Mine'"):
-        lie(lambda told: {**told, name: value} if isinstance(told, dict) and "flags" in told else told)
+def each(values: dict[str, list[Any]]) -> list[tuple[str, Any]]:
+    return [(name, value) for name, several in values.items() for value in several]
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in CODE.items() for value in values])
-def test_code_that_is_not_that_of_the_file(name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
+@pytest.mark.parametrize(
+    ("part", "name", "value"), [*(("", *one) for one in each(FACTS)), *(("code", *one) for one in each(CODE))]
+)
+def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part: str, name: str, value: Any, lie: Lie) -> None:
     def change(told: Any) -> Any:
-        return {**told, "code": {**told["code"], name: value}} if isinstance(told, dict) and "flags" in told else told
+        if not (isinstance(told, dict) and "flags" in told):
+            return told
+        return {**told, part: {**told[part], name: value}} if part else {**told, name: value}
 
     with pytest.raises(UserError, match=r"method 'mine.py:Mine'"):
         lie(change)
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in RESULTS.items() for value in values])
-def test_results_that_no_function_has(
-    name: str, value: Any, lie: Callable[[Callable[[Any], Any]], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("name", "value"), each(RESULTS))
+def test_results_that_no_function_has(name: str, value: Any, lie: Lie, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = [""]
 
     def send(channel: Channel, told: Any) -> None:
@@ -130,6 +131,6 @@ def test_results_that_no_function_has(
 
 
 @pytest.mark.parametrize("value", NUMBERS)
-def test_numbers_that_no_process_has(value: Any, lie: Callable[[Callable[[Any], Any]], None]) -> None:
+def test_numbers_that_no_process_has(value: Any, lie: Lie) -> None:
     with pytest.raises((UserError, CellError), match="method"):
         lie(lambda told: value if type(told) is int else told)

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from holobench_eval.display.api import from_numpy
-from tests.study.studies import MILD, write_study
+from tests.study.studies import write_study
 from tests.support.trained_study import compute
 
 METHODS = """
@@ -60,7 +60,7 @@ def records(folder: Path, isolation: str, *methods: str, **entries: str) -> dict
     """The records of a study by label; one with NumPy's arrays in it as one without."""
     folder.mkdir(exist_ok=True)
     (folder / "mine.py").write_text(METHODS)
-    config = write_study(folder / "study.yaml", *methods, display=MILD, isolation=isolation, **entries)
+    config = write_study(folder / "study.yaml", *methods, isolation=isolation, **entries)
     return {record["label"]: record for record in compute(config).records}
 
 
@@ -69,39 +69,29 @@ def named(label: str, name: str, params: str = "{}") -> str:
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_a_phase_scores_what_its_tensor_scores(tmp_path: Path, isolation: str) -> None:
+def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path: Path, isolation: str) -> None:
     double = "{double: true}"
-    methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array")]
+    methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array"), named("levels", "levels")]
     methods += [named("t64", "Tensors", double), named("a64", "Arrays", double)]
     found = records(tmp_path, isolation, *methods)
+    levels = found.pop("levels")
+    assert (levels["state"], levels["reason"]) == ("failed", REFUSED[isolation].format("levels"))
     assert {record["state"] for record in found.values()} == {"done"}, [r["reason"] for r in found.values()]
     assert found["t"]["scores"] == found["a"]["scores"] == found["function"]["scores"] != found["t64"]["scores"]
     assert found["t64"]["scores"] == found["a64"]["scores"]
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_levels_are_no_phase(tmp_path: Path, isolation: str) -> None:
-    record = records(tmp_path, isolation, named("levels", "levels"))["levels"]
-    assert record["state"] == "failed"
-    assert record["reason"] == REFUSED[isolation].format("levels")
-
-
-@pytest.mark.parametrize("isolation", ["none", "files"])
 def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path, isolation: str) -> None:
     found = {}
-    for shown in ("Tensors", "Arrays"):
-        methods, shown_by = (named("t", "Tensors"), named("a", "Arrays")), f"{{name: 'mine.py:{shown}'}}"
+    for shown in ("Tensors", "Arrays", "levels"):
+        predicted, shown_by = (named("t", "Tensors"), named("a", "Arrays")), f"{{name: 'mine.py:{shown}'}}"
+        methods = predicted if shown == "Tensors" else predicted[:1]
         found[shown] = records(tmp_path / shown, isolation, *methods, measure="prediction", holograms=shown_by)
-        assert {record["state"] for record in found[shown].values()} == {"done"}
-        assert found[shown]["t"]["scores"] == found[shown]["a"]["scores"]
-    assert found["Tensors"]["t"]["scores"] == found["Arrays"]["t"]["scores"]
-
-
-@pytest.mark.parametrize("isolation", ["none", "files"])
-def test_a_hologram_that_is_no_phase_is_named(tmp_path: Path, isolation: str) -> None:
-    levels = "{name: 'mine.py:levels'}"
-    found = records(tmp_path, isolation, named("t", "Tensors"), measure="prediction", holograms=levels)
-    assert found["t"]["reason"] == REFUSED[isolation].format("mine.py:levels")
+    assert found["levels"]["t"]["reason"] == REFUSED[isolation].format("mine.py:levels")
+    first, same, other = found["Tensors"]["t"], found["Tensors"]["a"], found["Arrays"]["t"]
+    assert {record["state"] for record in (first, same, other)} == {"done"}
+    assert first["scores"] == same["scores"] == other["scores"]
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])

@@ -72,7 +72,7 @@ def test_an_honest_method_is_let_through(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["Flatterer", "Silencer", "Failing"])
 def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path: Path, name: str) -> None:
     with pytest.raises(StopError, match=rf"method 'methods.py:{name}' has changed the harness: .* leto-mild"):
-        compute(study(tmp_path, "Honest", name), tmp_path / "out")
+        compute(study(tmp_path, name), tmp_path / "out")
     scored = [path for path in Store(tmp_path / "out").folder.glob("*.json") if name in path.read_text()]
     assert scored == []
 

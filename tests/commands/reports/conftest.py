@@ -1,0 +1,33 @@
+"""A finished report, computed once without physics, that tests copy and spoil."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.report import build_report
+from holobench_eval.study.config import load_study
+from tests.study.test_run import compute
+from tests.support.fake_study import FAKES, write_config
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a config, and its report in ``reports/study``."""
+    folder = tmp_path_factory.mktemp("finished")
+    config, report = write_config(folder, count=2), folder / "reports" / "study"
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name, fake in FAKES:
+            patch.setattr(module, name, fake)
+        outcome = compute(config, report)
+        build_report(load_study(config), outcome.records, report, outcome.provenance)
+    return folder
+
+
+@pytest.fixture
+def made(finished: Path, tmp_path: Path) -> Path:
+    """The report in a copy of that folder."""
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "reports" / "study"
