@@ -15,7 +15,7 @@ from torch.nn import Parameter
 from ..imaging.register import Registration
 from ..optics import AngularSpectrum
 from ..optics.convolution import frequencies
-from ..optics.phase import Matrix, refocus
+from ..optics.phase import TAU, Matrix, refocus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
@@ -99,6 +99,8 @@ class DisplaySpec:
         That of the viewer, where its prescription is known: ``focus`` of ``stages.eye.Eye``.
     blaze
         That the display adds, (vertical, horizontal) cycles a pixel.
+    levels
+        Phase of every level by the maker's table, a colour [rad]; empty: equal steps, ``2^bits`` to a turn.
     """
 
     name: str
@@ -111,6 +113,21 @@ class DisplaySpec:
     region: Region
     eye: Matrix = (0.0, 0.0, 0.0)
     blaze: tuple[float, float] = (0.0, 0.0)
+    levels: tuple[tuple[float, ...], ...] = ()
+
+    def level_phases(self, channel: int) -> Tensor:
+        """Nominal phase of every level of a colour, ``(2^bits,)`` [rad]. A display shows level ``g`` where it is given
+        the phase ``2 pi g / 2^bits``, whatever phase the level has.
+
+        Examples
+        --------
+        >>> spec = DisplaySpec("binary", (8, 8), 8.2e-6, (532e-9,), 0.1, 1, None, Region(0, 0, 8, 8))
+        >>> spec.level_phases(0)
+        tensor([0.0000, 3.1416])
+        """
+        if self.levels:
+            return torch.tensor(self.levels[channel])
+        return torch.arange(2**self.bits) * (TAU / 2**self.bits)
 
     def propagator(
         self, channel: int, dtype: torch.dtype = torch.complex64, device: torch.device | str = "cpu"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from annotated_types import Interval
+from annotated_types import Interval, Len
 from torch import Tensor
 
 from ....core.units import Check, Metres
@@ -40,7 +40,8 @@ class Panel(Stage):
     [m]; distance: from the panel, or its image behind a relay, to the image plane [m], which shrinks with the rows on a
     smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn [bits]; pupil: diameter of the iris
     [share of the band 1 / pitch], null for none; blaze: carrier that the display adds and re-centres, vertical and
-    horizontal [cycles/px]; region: side of the scored window [share of the panel's].
+    horizontal [cycles/px]; region: side of the scored window [share of the panel's]; levels: phase of each level by the
+    maker's table, which methods are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps.
     """
 
     title: ClassVar[str] = "panel"
@@ -54,10 +55,13 @@ class Panel(Stage):
     pupil: Annotated[float, Interval(gt=0, le=1)] | None = None
     blaze: tuple[float, float] = (0.0, 0.0)
     region: Annotated[float, Interval(gt=0.1, le=1)] = 1.0
+    levels: Annotated[tuple[float, ...], Len(0, 1024)] = ()
 
     def spec(self, name: str) -> DisplaySpec:
         """The nominal optics of a display of that name."""
         height, width = (max(1, round(self.region * size)) for size in self.shape)
+        largest = TAU * (1 - 2.0**-self.bits)
+        levels = tuple(value / 100 * largest for value in self.levels)
         return DisplaySpec(
             name=name,
             shape=self.shape,
@@ -68,6 +72,7 @@ class Panel(Stage):
             pupil=self.pupil,
             region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
             blaze=self.blaze,
+            levels=(levels,) * len(self.wavelengths) if levels else (),
         )
 
     def effects(self, profile: Profile) -> Iterator[Effect]:

@@ -1,0 +1,1 @@
+"""Holograms for panels of few levels."""

@@ -1,0 +1,66 @@
+"""What few levels cost, and what a method wins back, on an ideal panel of two levels and on one with a table."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import pytest
+import torch
+
+from holobench_eval.datasets.photographs import Photographs
+from holobench_eval.display import DisplaySpec, load_profile
+from holobench_eval.display.api import ideal_light
+from holobench_eval.methods.coarse.gumbel import Gumbel, gumbel_noise
+from holobench_eval.methods.coarse.nearest_level import NearestLevel
+from holobench_eval.methods.coarse.straight_through import StraightThrough
+from holobench_eval.methods.common import matched
+from holobench_eval.methods.wirtinger import Wirtinger
+from holobench_eval.metrics.psnr import psnr
+from holobench_eval.optics.phase import gray_level
+
+BINARY = replace(load_profile("ideal").spec((128, 128)), bits=1, wavelengths=(517e-9,))
+TABULATED = replace(load_profile("plm-4bit").spec((128, 128)), wavelengths=(517e-9,), pupil=None)
+
+
+class Bench:
+    """Nominal optics and random numbers, and nothing kept."""
+
+    def __init__(self, spec: DisplaySpec) -> None:
+        self.spec = spec
+
+    def generator(self, *names: object) -> torch.Generator:
+        return torch.Generator().manual_seed(len(repr(names)))
+
+    def solved(self, method: Any, target: torch.Tensor) -> torch.Tensor:
+        return method.solve(target, self)
+
+
+@cache
+def quality(method: Any, spec: DisplaySpec) -> float:
+    """PSNR [dB] of what a faultless panel with these levels makes of a photograph."""
+    target = Photographs(names=("camera",)).load("camera", spec.region.shape)[1:2].float()
+    level = gray_level(method.solve(target[None], Bench(spec))[0], spec.bits).long()
+    shown = spec.level_phases(0)[level]
+    image = spec.region.crop(ideal_light(shown, spec))
+    return float(psnr(matched(image, target).clamp(0, 1), target))
+
+
+def test_to_know_the_table_gains_and_to_descend_on_it_gains_more() -> None:
+    unaware, rounded = quality(Wirtinger(), TABULATED), quality(NearestLevel(), TABULATED)
+    assert rounded > unaware + 2
+    assert quality(StraightThrough(), TABULATED) > rounded + 1
+
+
+def test_on_two_levels_annealing_gains_and_the_straight_through_gradient_does_not() -> None:
+    rounded = quality(NearestLevel(), BINARY)
+    assert rounded == pytest.approx(quality(Wirtinger(), BINARY), abs=1e-4)  # the display rounds as well
+    assert quality(Gumbel(), BINARY) > rounded + 4
+    assert quality(StraightThrough(), BINARY) < rounded + 1
+
+
+def test_gumbel_noise_has_the_mean_and_spread_of_its_distribution() -> None:
+    noise = gumbel_noise((400_000,), torch.Generator().manual_seed(1)).double()
+    assert float(noise.mean()) == pytest.approx(0.5772, abs=0.01)
+    assert float(noise.std()) == pytest.approx(torch.pi / 6**0.5, abs=0.01)
