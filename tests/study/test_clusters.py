@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import stat
 import sys
 import threading
@@ -193,10 +194,13 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.slow
 @pytest.mark.parametrize("on_gpu", [False, True])
 def test_jobs_of_a_slurm_queue_run_on_workers_of_one_thread_that_declare_a_gpu_beside_the_sites_own_arguments(
-    queue: Path, on_gpu: bool
+    queue: Path, on_gpu: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import dask
 
+    for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:
+        monkeypatch.delitem(sys.modules, name)  # imported here, as by a run
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with dask.config.set({"jobqueue.slurm.worker-extra-args": ["--lifetime", "1h"]}):
         assert dict(Slurm(1 + on_gpu, on_gpu).map(abs, range(-3, 0))) == {-3: 3, -2: 2, -1: 1}  # on a GPU if asked for
     script = queue.read_text()
@@ -204,3 +208,4 @@ def test_jobs_of_a_slurm_queue_run_on_workers_of_one_thread_that_declare_a_gpu_b
     assert "export OMP_NUM_THREADS=1" in script
     assert ("--lifetime 1h --resources GPU=1" if on_gpu else "--lifetime 1h") in script
     assert ("--resources" in script) == on_gpu
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler  # Ctrl-C ends a run in order

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import platform
+import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
@@ -88,10 +89,13 @@ class Slurm(_Cluster):
 
     @contextmanager
     def _client(self) -> Iterator[Any]:
+        on_interrupt = signal.getsignal(signal.SIGINT)
         try:
             from dask_jobqueue.slurm import SLURMCluster
         except ImportError:
             raise UserError(f"the executor slurm needs dask-jobqueue: {installing(extra='cluster')}") from None
+        finally:
+            signal.signal(signal.SIGINT, on_interrupt)  # which importing it sets to an exit with code 0
         import dask
         from distributed import Client
 
