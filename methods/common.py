@@ -36,7 +36,7 @@ class Bench(Protocol):
 def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) -> Tensor:
     """Solve the colours of ``(B, C, h, w)`` one after the other (each has its wavelength), to ``(B, C, H, W)``."""
     colours = enumerate(target.unbind(1))
-    return torch.stack([solve_channel(colour.contiguous(), channel) for channel, colour in colours], dim=1)
+    return torch.stack([solve_channel(colour.contiguous(), channel) for channel, colour in colours], dim=-3)
 
 
 def nominal_model(bench: Bench, channel: int, like: Tensor) -> AngularSpectrum:

@@ -39,7 +39,6 @@ _solved: dict[object, list[Tensor]] = {}  # those of the last optics
 
 def _hologram(display: Display, target: Tensor, number: int) -> Tensor:
     handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", number))
-    method = Wirtinger(iterations=30, initial_phase="random")
     if display.spec.bits == 1:
-        method = Gumbel(iterations=100, initial_phase="random")
-    return method.solve(target[None], handle)[0]
+        return Gumbel(iterations=100, initial_phase="random").solve(target[None], handle)[0]
+    return Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]

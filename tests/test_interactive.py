@@ -50,6 +50,19 @@ def test_what_is_public_is_there_and_nothing_else() -> None:
         _ = hb.solve  # type: ignore[attr-defined]
 
 
+def test_frames_of_a_fast_panel_are_one_capture_and_a_slow_one_refuses_them(target: interactive.Array) -> None:
+    fast = hb.open_display("plm-4bit", panel=(128, 128))
+    draw = np.random.default_rng(1)
+    phase = fast.solve(lambda target, bench: draw.uniform(0, 6, (1, 4, 3, 128, 128)), target[:, :104, :104])
+    assert phase.shape == (4, 3, 128, 128)
+    picture = fast.target(np.ones((104, 104, 3), dtype=np.float32))
+    images = (fast.capture(phase[0], picture), fast.capture(phase, picture))
+    speckle = [np.std(image) / np.mean(image) for image in images]
+    assert speckle[1] < 0.7 * speckle[0]
+    with pytest.raises(UserError, match="phase has 4 frames, the display shows 1 at most in an exposure"):
+        hb.open_display("ideal", panel=(128, 128)).capture(phase, target)
+
+
 @pytest.mark.slow
 def test_a_noise_free_display_gives_the_score_of_a_study(tmp_path: Path, display: hb.OpenDisplay) -> None:
     config = write_study(

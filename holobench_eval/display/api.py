@@ -101,6 +101,8 @@ class DisplaySpec:
         That the display adds, (vertical, horizontal) cycles a pixel.
     levels
         Phase of every level by the maker's table, a colour [rad]; empty: equal steps, ``2^bits`` to a turn.
+    frames
+        Most frames that the panel shows in one exposure, whose light adds up.
     """
 
     name: str
@@ -114,6 +116,7 @@ class DisplaySpec:
     eye: Matrix = (0.0, 0.0, 0.0)
     blaze: tuple[float, float] = (0.0, 0.0)
     levels: tuple[tuple[float, ...], ...] = ()
+    frames: int = 1
 
     def level_phases(self, channel: int) -> Tensor:
         """Nominal phase of every level of a colour, ``(2^bits,)`` [rad]. A display shows level ``g`` where it is given
@@ -243,7 +246,10 @@ class Camera(Protocol):
         """Tell which phases ``(C, H, W)`` [rad] are captured next, so that they can be captured in one go."""
 
     def capture(self, phase: Tensor) -> Capture:
-        """Show ``phase`` ``(C, H, W)`` [rad, any range: the display wraps it] and photograph the image plane."""
+        """Show ``phase`` ``(C, H, W)`` [rad, any range: the display wraps it] and photograph the image plane.
+
+        Several frames ``(F, C, H, W)`` share the exposure.
+        """
 
 
 class Simulation(Protocol):
@@ -301,7 +307,7 @@ class Display(Protocol):
         Parameters
         ----------
         phase
-            ``(C, H, W)`` [rad].
+            ``(C, H, W)`` [rad], or frames ``(F, C, H, W)`` that share the exposure.
         target
             ``(C, h, w)`` linear light in [0, 1].
         item, repeat
@@ -329,20 +335,22 @@ def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
     Parameters
     ----------
     phase
-        ``(C, H, W)`` [rad].
+        ``(C, H, W)`` [rad], or frames ``(F, C, H, W)``.
     spec
         The display's nominal optics.
 
     Returns
     -------
     Tensor
-        ``(C, h, w)`` in the region; the mean incident light on the panel is 1.
+        ``(C, h, w)`` in the region, of frames their mean; the mean incident light on the panel is 1.
     """
     return spec.region.crop(ideal_light(phase, spec))
 
 
 def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
     """`ideal_image` in the entire image plane, ``(C, H, W)``, the light beside the region too."""
+    if phase.ndim == 4:
+        return torch.stack([ideal_light(frame, spec) for frame in phase]).mean(0)
     fields = [
         spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
         for channel, panel in enumerate(phase.float())

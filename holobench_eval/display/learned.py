@@ -54,6 +54,8 @@ class LearnedBench(MethodHandles):
     ) -> RectifiedCapture:
         """The predicted capture of ``phase`` ``(C, H, W)`` [rad]; the exposure does not matter without noise."""
         check_phase(phase, self.spec, label)
+        if phase.ndim == 4:
+            raise CellError(f"{label}: a trained network predicts one frame, got {len(phase)}")
         handle = MeteredDisplay(self, label, target.to(self.device), (self.seed, item, repeat), learned=self.learned)
         image = from_numpy(self.method.predict(phase[None].to(self.device), handle))[0].detach().cpu()
         light = tuple(white_irradiance(target, self.spec).tolist())

@@ -189,7 +189,7 @@ class MeteredDisplay:
         Parameters
         ----------
         phase
-            ``(C, H, W)`` [rad], any range.
+            ``(C, H, W)`` [rad], any range; or frames ``(F, C, H, W)``, which share the exposure.
 
         Returns
         -------
@@ -232,14 +232,14 @@ class MeteredDisplay:
         Parameters
         ----------
         phase
-            ``(C, H, W)`` or ``(1, C, H, W)`` [rad].
+            ``(C, H, W)`` or ``(1, C, H, W)`` [rad], or frames ``(F, C, H, W)`` or ``(1, F, C, H, W)``.
 
         Raises
         ------
         CellError
             No display can show the phase.
         """
-        hologram = phase[0] if phase.ndim == 4 and len(phase) == 1 else phase
+        hologram = phase[0] if phase.ndim > 3 and len(phase) == 1 else phase
         check_phase(hologram, self.spec, self._label)
         self._kept = hologram.detach().cpu().clone()
 

@@ -31,16 +31,28 @@ UNITS = {  # what values in a span may be, and what makes radians of them
 MIRRORED = {"": (), "mirrored left to right": (-1,), "mirrored top to bottom": (-2,), "turned by 180 degrees": (-2, -1)}
 
 
+def single(output: Tensor, channels: int) -> Tensor | None:
+    """The hologram of one image that ``solve`` gave, ``(1, C, H, W)`` to ``(C, H, W)``, or of several frames
+    ``(1, F, C, H, W)`` to ``(F, C, H, W)``; None for another shape."""
+    if output.ndim == 5 and output.shape[1] == 1:
+        output = output[:, 0]
+    fits = output.ndim in (4, 5) and len(output) == 1 and output.shape[-3] == channels
+    return output[0] if fits else None
+
+
 def check_phase(phase: Tensor, spec: DisplaySpec, label: str) -> None:
-    """Refuse a phase ``(C, H, W)`` [rad] that no display can show. label: name of the method in the error message.
+    """Refuse a phase ``(C, H, W)`` or frames ``(F, C, H, W)`` [rad] that the display cannot show. label: name of the
+    method in the error message.
 
     CellError for another shape or type, a subclass of ``Tensor`` among them, and as by ``check_radians``.
     """
     who = f"{label}: " if label else ""
     if not is_plain(phase):
         raise CellError(f"{who}phase is {type_name(phase)}, the display shows a plain torch.Tensor")
-    if phase.ndim != 3 or tuple(phase.shape[-2:]) != spec.shape:
+    if phase.ndim not in (3, 4) or tuple(phase.shape[-2:]) != spec.shape:
         raise CellError(f"{who}phase is {tuple(phase.shape)}, the display shows (C, {spec.shape[0]}, {spec.shape[1]})")
+    if phase.ndim == 4 and not 1 <= len(phase) <= spec.frames:
+        raise CellError(f"{who}phase has {len(phase)} frames, the display shows {spec.frames} at most in an exposure")
     check_radians(phase, who)
 
 
@@ -70,7 +82,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     Parameters
     ----------
     phase
-        ``(C, H, W)`` [rad] that the display can show, see ``check_phase``.
+        ``(C, H, W)`` or ``(F, C, H, W)`` [rad] that the display can show, see ``check_phase``.
     target
         ``(C, h, w)`` linear light in [0, 1].
     spec
@@ -88,7 +100,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     own = as_given.get("", 1.0)
     if own >= RIGHT or low == high:
         return ""
-    readings = {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(0)}
+    readings = {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}
     for (first, last), (unit, scale) in UNITS.items():
         if first <= low and high <= last:
             readings[f"read as {unit}"] = scale * phase

@@ -20,7 +20,7 @@ from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
 from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, type_name
-from ..display.phases import check_phase, phase_doubt
+from ..display.phases import check_phase, phase_doubt, single
 from ..display.traits import traits_of
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
@@ -89,7 +89,7 @@ class OpenDisplay:
         Returns
         -------
         ndarray
-            ``(C, H, W)`` phase [rad].
+            ``(C, H, W)`` phase [rad], or frames ``(F, C, H, W)``.
 
         Raises
         ------
@@ -108,16 +108,17 @@ class OpenDisplay:
         try:
             with self._threads():
                 given = solver.solve(light[None].clone(), handle)
-            phase = from_numpy(np.asarray(given) if isinstance(given, Described) else given)
+            output = from_numpy(np.asarray(given) if isinstance(given, Described) else given)
         except (CellError, UserError):
             raise
         except (Exception, SystemExit) as error:  # whatever a stranger's method does
             raise CellError(f"{label}: {reason(error)}") from error
-        if not is_plain(phase) or tuple(phase.shape) != (1, len(light), *self.spec.shape):
-            found = tuple(phase.shape) if isinstance(phase, Tensor) else type_name(phase)
+        phase = single(output, len(light)) if is_plain(output) else None
+        if phase is None or tuple(phase.shape[-2:]) != self.spec.shape:
+            found = tuple(output.shape) if isinstance(output, Tensor) else type_name(output)
             raise CellError(f"{label}: solve returned {found}, not a phase {(1, len(light), *self.spec.shape)}")
-        check_phase(phase[0], self.spec, label)
-        return described(phase[0].detach().cpu().numpy(), PHASE)
+        check_phase(phase, self.spec, label)
+        return described(phase.detach().cpu().numpy(), PHASE)
 
     def capture(self, phase: Numbers, target: Numbers, repeat: int = 0) -> Array:
         """Show a phase, photograph it and bring the capture into the frame of the target.
@@ -186,7 +187,7 @@ class OpenDisplay:
 
     def _phase(self, phase: Numbers) -> Tensor:
         shown, wanted = tensor_of(phase, "a phase", RADIANS), (len(self.spec.wavelengths), *self.spec.shape)
-        if tuple(shown.shape) != wanted:
+        if shown.ndim not in (3, 4) or tuple(shown.shape[-3:]) != wanted:
             raise UserError(f"a phase of {tuple(shown.shape)}; the display shows {wanted}")
         try:
             check_phase(shown, self.spec, "")

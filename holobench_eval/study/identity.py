@@ -35,7 +35,7 @@ from .versions import GIVEN, GIVEN_GRAY, HARNESS, PHOTOGRAPHS
 
 Plain = dict[str, Any]
 BASIS = ("given", "target", "optics", "draw")  # entries of a phase that are not of its method
-LATER = ("levels",)  # nominal optics that came later: a display without them keeps its names
+LATER = {"levels": (), "frames": 1}  # nominal optics that came later: a display without them keeps its names
 SPECKLE = "speckle_contrast"
 # What the protocol gives beside its metrics: the match of a capture with its target, and the move that refines both.
 MATCH, REFINED = "match", "refine"
@@ -73,7 +73,7 @@ def phase(
 def basis(target: Mapping[str, Any], spec: DisplaySpec, draw: tuple[object, ...]) -> Plain:
     """The entries of a phase that are not of its method, see ``phase``."""
     told = asdict(spec)
-    optics = {name: told[name] for name in told if name != "name" and (told[name] or name not in LATER)}
+    optics = {name: told[name] for name in told if name != "name" and (name not in LATER or told[name] != LATER[name])}
     given = GIVEN if len(spec.wavelengths) > 1 else GIVEN_GRAY
     return _plain({"given": given, "target": dict(target), "optics": optics, "draw": list(draw)})
 

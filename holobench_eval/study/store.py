@@ -50,7 +50,8 @@ class Record:
 
     capture: its description (``identity.capture``), which names the record; state: ``done``, or why there is none in
     ``reason``; label, condition, target: its names in tables; scores: by metric; figures: what else was measured of
-    it, by column; captures: camera captures that the method took, those of failed attempts included; seconds: wall
+    it, by column; captures: camera captures that the method took, those of failed attempts included; frames: of the
+    hologram, which share the exposure; seconds: wall
     time of the solution; reused: whether that was solved before, for another display, study or run; alone: whether it
     was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
     solution [MiB]; cpu_s: its time of all processors;
@@ -70,6 +71,7 @@ class Record:
     scores: dict[str, Scores] = field(default_factory=dict)
     figures: dict[Column, FiniteFloat] = field(default_factory=dict)
     captures: Annotated[int, Interval(ge=0, le=10**9)] = 0
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
     seconds: Amount | None = None
     reused: bool = False
     alone: bool | None = None

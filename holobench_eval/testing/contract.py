@@ -28,7 +28,8 @@ def check_method(method: Any) -> None:
     """Check a method, given as a class (then with its default parameters) or as an instance.
 
     AssertionError, with a sentence on what is wrong, unless it is a frozen dataclass with plain parameters, turns
-    intensity ``(B, C, h, w)`` into a finite phase ``(B, C, H, W)`` for one and several images and for one and three
+    intensity ``(B, C, h, w)`` into a finite phase ``(B, C, H, W)``, or frames ``(B, F, C, H, W)``, for one and several
+    images and for one and three
     colours (for three alone if it has a camera), gives the same phase for the same seed, leaves its target alone, and
     captures only with ``camera = True``. One that learns is prepared first, with three smooth images.
     """
@@ -112,7 +113,8 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, learned
     assert is_plain(phase), (
         f"{name}.solve returned {type_name(phase)}, not a plain torch.Tensor or a NumPy array of float32 or float64"
     )
-    assert tuple(phase.shape) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
+    assert phase.ndim in (4, 5), f"{name}.solve returned {tuple(phase.shape)} for {shape}"
+    assert (len(phase), *phase.shape[-3:]) == shape, f"{name}.solve returned {tuple(phase.shape)} for {shape}"
     assert phase.is_floating_point(), f"{name}.solve returned {phase.dtype}, not a phase in radians"
     assert bool(phase.isfinite().all()), f"{name}.solve returned a phase with NaN or infinite values"
     assert torch.equal(target, before), f"{name}.solve changed its target; clone it first"

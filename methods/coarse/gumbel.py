@@ -34,8 +34,13 @@ class Gumbel:
     the loss is of intensity; and the start is smooth. Time and memory grow with the number of levels. SI units
     throughout.
 
+    Several frames are found together: the loss is that of their mean intensity, and they share one exposure. Each frame
+    has noise of its own.
+
     Parameters
     ----------
+    frames : int
+        Frames of a hologram.
     iterations : int
         Evaluations of loss and gradient.
     step : float
@@ -43,7 +48,7 @@ class Gumbel:
     sharpness : float
         Of the score ``sharpness 4 s (1 - s)``, s the logistic function of ``width`` times the distance over pi.
     width : float
-        See ``sharpness``.
+        How fast the score falls with that distance.
     hottest, coldest : float
         Temperatures of the first and the last iteration; in between they fall by equal factors.
     initial_phase : str
@@ -51,6 +56,7 @@ class Gumbel:
         lens that gathers the light of the panel in the region; dpe: the double phase hologram.
     """
 
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 300
     step: Annotated[float, Interval(gt=0, le=10)] = 0.1
     sharpness: Annotated[float, Interval(gt=0, le=1e4)] = 30.0
@@ -77,28 +83,32 @@ class Gumbel:
         Returns
         -------
         Tensor
-            Phase ``(B, C, H, W)`` [rad].
+            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
         """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         model, region = nominal_model(bench, channel, target), bench.spec.region
         levels, draw = Levels(bench.spec, channel, target), bench.generator("gumbel", channel)
-        phase = initial_phase(self.initial_phase, target, bench, channel).clone()
+        start = initial_phase(self.initial_phase, target, bench, channel)
+        phase = start.repeat_interleave(self.frames, dim=0)  # (B F, H, W)
         optimiser = Adam(phase, self.step)
         for iteration in range(self.iterations):
             temperature = self.hottest * (self.coldest / self.hottest) ** (iteration / self.iterations)
-            noise = gumbel_noise((len(levels.phases), *phase.shape[-2:]), draw).to(phase)
+            noise = gumbel_noise((self.frames, len(levels.phases), *phase.shape[-2:]), draw).to(phase)
+            noise = noise.repeat(len(target), 1, 1, 1)
 
             def loss(phase: Tensor, temperature: float = temperature, noise: Tensor = noise) -> Tensor:
                 light = self._soft(phase, levels, temperature, noise)
-                return intensity_l2(region.crop(model.forward(light)).abs().square(), target)
+                intensity = region.crop(model.forward(light)).abs().square()
+                return intensity_l2(intensity.unflatten(0, (-1, self.frames)).mean(1), target)
 
             optimiser.step(by_autograd(loss)(phase)[1])
-        return levels.shown_by(levels.nearest(phase))
+        shown = levels.shown_by(levels.nearest(phase))
+        return shown if self.frames == 1 else shown.unflatten(0, (-1, self.frames))
 
     def _soft(self, phase: Tensor, levels: Levels, temperature: float, noise: Tensor) -> Tensor:
-        """The light ``(B, H, W)`` of soft choices at a phase ``(B, H, W)``; noise ``(L, H, W)``."""
+        """The light ``(B, H, W)`` of soft choices at a phase ``(B, H, W)``; noise ``(B, L, H, W)``."""
         shown = levels.light(torch.arange(len(levels.phases), device=phase.device)[:, None, None])
         apart = torch.remainder(phase[:, None] - shown + math.pi, TAU) - math.pi
         nearness = torch.sigmoid(apart * (self.width / math.pi))

@@ -148,7 +148,7 @@ class Phases:
         Returns
         -------
         Tensor
-            Phase ``(B, C, H, W)`` [rad], the same for every image of a batch.
+            Phase ``(B, C, H, W)`` or frames ``(B, F, C, H, W)`` [rad], the same for every image of a batch.
         """
         spec, colours = bench.spec, target.shape[1]
         phase = self._read(self.file, bench.target_name, spec, colours)
@@ -159,7 +159,7 @@ class Phases:
             phase = torch.polar(modulus, phase.double())
         if phase.is_complex():
             phase = encode(phase) if self.encoder == "double_phase" else phase.angle()
-        return phase.float().to(target.device).expand(len(target), -1, -1, -1).clone()
+        return phase.float().to(target.device).expand(len(target), *phase.shape).clone()
 
     def _paths(self, pattern: str, target_name: str) -> list[str]:
         name = file_name(target_name)
@@ -167,7 +167,8 @@ class Phases:
         return [path.replace("{channel}", name) for name in self.channels] if "{channel}" in path else [path]
 
     def _read(self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, phases: bool = True) -> Tensor:
-        """What the files of a pattern hold, ``(C, H, W)``: phases [rad], complex fields, or amplitudes."""
+        """What the files of a pattern hold, ``(C, H, W)`` or ``(F, C, H, W)``: phases [rad], complex fields, or
+        amplitudes."""
         paths = self._paths(pattern, target_name)
         if len(paths) > 1 and len(paths) != colours:
             raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
@@ -181,8 +182,15 @@ class Phases:
         return self._planes(paths[0], spec, colours, panel)
 
     def _planes(self, path: str, spec: DisplaySpec, colours: int, panel: Convention | None) -> Tensor:
-        """What a file holds, ``(C, H, W)``; panel: the meaning of its levels, None for amplitudes."""
+        """What a file holds, see ``_read``; panel: the meaning of its levels, None for amplitudes."""
         array = read_array(Path(path), self.variable)
+        if array.ndim == 4:
+            return torch.stack([self._frame(frame, path, spec, colours, panel) for frame in array])
+        return self._frame(array, path, spec, colours, panel)
+
+    def _frame(
+        self, array: NDArray[Any], path: str, spec: DisplaySpec, colours: int, panel: Convention | None
+    ) -> Tensor:
         if array.ndim == 3 and array.shape[-1] == colours and array.shape[:2] == spec.shape:
             array = np.moveaxis(array, -1, 0)
         if array.ndim == 2:

@@ -131,7 +131,8 @@ class Spy(torch.Tensor):
     [
         (torch.full((3, *PANEL), math.nan), "phase holds 49152 values that are NaN or infinite"),
         (torch.full((3, *PANEL), 1e300, dtype=torch.float64), "phase holds 49152 values that are NaN or infinite"),
-        (torch.zeros(2, 3, *PANEL), r"phase is \(2, 3, 128, 128\)"),
+        (torch.zeros(2, 3, *PANEL), "phase has 2 frames, the display shows 1 at most in an exposure"),
+        (torch.zeros(1, 1, 3, *PANEL), r"phase is \(1, 1, 3, 128, 128\)"),
         (torch.zeros(3, *PANEL, dtype=torch.complex64), "phase is torch.complex64"),
         (torch.zeros(3, *PANEL).as_subclass(Spy), "phase is Spy, the display shows a plain"),
     ],

@@ -4,6 +4,7 @@ holoeval than order.csv and the phase convention in manifest.json."""
 import csv
 import json
 import math
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import cv2
 import numpy as np
 import torch
 
+from holobench_eval.core.seeds import generator
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import Relay
@@ -35,7 +37,7 @@ class Lab:
     def __init__(self, profile: str, panel: tuple[int, int], seed: int, dark: int = 900, sign: int = 1) -> None:
         description = load_profile(profile).scaled(panel)
         self.bench = SimulatedBench(replace(description, relay=another_pose(seed)))
-        self.draw = torch.Generator().manual_seed(seed)
+        self.seed, self.shown = seed, Counter()
         self.dark, self.gain, self.sign, self.gamma = dark, None, sign, 1.0
 
     def photograph_round(self, folder: Path, number: int) -> None:
@@ -62,7 +64,10 @@ class Lab:
             if self.gain is None and row["laser"] == "on":
                 self.gain = ROOM * 65535 / float(light.max()) / 2
             counts = (light * (self.gain or 0) / 65535) ** self.gamma * 65535 + self.dark
-            counts = counts + 20 * torch.randn(counts.shape, generator=self.draw)
+            pattern = levels.tobytes(), row["laser"], channel
+            self.shown[pattern] += 1
+            draw = generator("lab", self.seed, *pattern, self.shown[pattern])  # whatever the order of the photographs
+            counts = counts + 20 * torch.randn(counts.shape, generator=draw)
             path = folder / row["save_photograph_as"]
             path.parent.mkdir(parents=True, exist_ok=True)
             cv2.imwrite(str(path), counts.round().clamp(0, 65535).numpy().astype(np.uint16))

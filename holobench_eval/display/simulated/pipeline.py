@@ -204,14 +204,15 @@ class SimulatedBench:
         return BenchSession(self, names, tuple(exposure))
 
     def photograph(self, phase: Tensor, exposure: Sequence[float], draw: torch.Generator) -> Capture:
-        """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad]."""
-        sensor, frames = (
-            self.profile.sensor,
-            torch.empty((len(phase), *self.response.shape), dtype=torch.float32, device="cpu"),
-        )
-        phase = phase.to(self.device)
+        """One colour-sequential capture of ``phase`` ``(C, H, W)`` [rad], or of frames ``(F, C, H, W)``: each has its
+        flicker, and the exposure, which has its noise, adds up their light."""
+        shown = phase.to(self.device)[None] if phase.ndim == 3 else phase.to(self.device)
+        sensor, size = self.profile.sensor, (shown.shape[1], *self.response.shape)
+        frames = torch.empty(size, dtype=torch.float32, device="cpu")
         for channel, frame in enumerate(frames):
-            light = self.integrated(phase[channel], channel, self.profile.flicker.gain(draw))
+            parts = (self.integrated(each[channel], channel, self.profile.flicker.gain(draw)) for each in shown)
+            light = reduce(add, parts)
+            light = light / len(shown) if len(shown) > 1 else light
             key = int(torch.randint(2**63 - 1, (), generator=draw))
             expose = partial(self._expose, light, exposure[channel], key, frame)
             in_blocks(expose, light, len(frame), frame.numel())
@@ -249,7 +250,7 @@ class BenchSession:
 
     @torch.no_grad()
     def capture(self, phase: Tensor) -> Capture:
-        """Show ``phase`` ``(C, H, W)`` [rad] and photograph the image plane."""
+        """Show ``phase`` ``(C, H, W)`` or ``(F, C, H, W)`` [rad] and photograph the image plane."""
         profile = self.bench.profile
         draw = generator("bench noise", profile.name, profile.seed, *self.names, self.frames)
         self.frames += 1

@@ -198,10 +198,8 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     """The profile of a file, with the values of those it is like. UserError: a fault, with file:line:column."""
     profile = typed(document, Profile, values)
     for stage, key, table in (("panel", "levels", profile.panel.levels), ("lut", "table", profile.lut.table)):
-        if table and len(table) != 2**profile.panel.bits:
-            levels = 2**profile.panel.bits
-            message = f"the table has {len(table)} entries; a panel of {profile.panel.bits} bits has {levels}"
-            raise document.error((stage, key), message)
+        if fault := profile.panel.fault_of(table):
+            raise document.error((stage, key), fault)
     if profile.lut.bend and profile.lut.table:
         raise document.error(("lut", "bend"), "a table has no exponent to bend; give gamma in the place of the table")
     if min(profile.lut.gamma) < SMALLEST_GAMMA + STEEPEST * profile.lut.bend:

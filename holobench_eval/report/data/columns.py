@@ -222,6 +222,16 @@ def solving_s(record: Record, layout: Layout) -> float | None:
     return record.get("seconds")
 
 
+def _if_several(values: pd.Series, layout: Layout) -> bool:
+    return bool((values > 1).any())
+
+
+@column(FIGURES, "count", kept=_if_several, table=mean, heading="frames of a hologram")
+def frames(record: Record, layout: Layout) -> int:
+    """Frames of the hologram, which share one exposure: the panel's time for a picture, in frames."""
+    return int(record.get("frames", 1))
+
+
 @column(FIGURES, "number")
 def registration_residual_px(record: Record, layout: Layout) -> float | None:
     """Rms residual of registration, in pixels of the scored region."""

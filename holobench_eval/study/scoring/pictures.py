@@ -40,9 +40,14 @@ def write_capture(path: Path, linear: Tensor) -> None:
 
 
 def write_phase(path: Path, phase: Tensor) -> None:
-    """Write a phase ``(C, H, W)`` [rad] as 8-bit gray levels, 256 levels to 2 pi, a colour channel per wavelength; and
-    beside it as .npy, in radians as the method gave it, which the method ``phases`` reads."""
-    write_png(path, (phase.double() / math.tau * 256).round().remainder(256), bits=8)
+    """Write a phase ``(C, H, W)`` [rad] as 8-bit gray levels, 256 levels to 2 pi, a colour channel per wavelength, of
+    frames ``(F, C, H, W)`` a picture each; and beside it as .npy, in radians as the method gave it, which the method
+    ``phases`` reads."""
+    named = [(path, phase)]
+    if phase.ndim == 4:
+        named = [(path.with_stem(f"{path.stem}-frame-{number}"), frame) for number, frame in enumerate(phase, 1)]
+    for file, frame in named:
+        write_png(file, (frame.double() / math.tau * 256).round().remainder(256), bits=8)
     exact = io.BytesIO()
     np.save(exact, phase.contiguous().numpy(), allow_pickle=False)
     write_atomically(path.with_suffix(".npy"), exact.getvalue())

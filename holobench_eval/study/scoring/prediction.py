@@ -203,5 +203,7 @@ def _solved(job: Job, cell: Cell, display: Condition, change: str = "") -> Solut
     wanted = changed_target(target, change, cell.seed, cell.target) if change else target
     own = wanted[None].to(job.device, copy=True)
     solved = solved_by(job, method, name, handle, lambda method, handle: method.solve(own, handle))
+    if solved.phase.ndim == 4:
+        raise CellError(f"holograms: {name} gives {len(solved.phase)} frames; models predict one")
     job.phases.keep(phase_id, solved)
     return solved

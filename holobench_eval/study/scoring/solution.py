@@ -13,6 +13,7 @@ from ...core.device import moved
 from ...core.errors import BudgetError, CellError
 from ...display import MeteredDisplay
 from ...display.api import from_numpy, is_plain, type_name
+from ...display.phases import single
 from .. import cost, identity, isolation
 from ..displays import Condition
 from ..isolation.read_files import digests
@@ -60,7 +61,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
         repeat=first.repeat,
         budget=first.captures,
         learned=moved(learned.state, job.device) if learned else None,
-        starts=others,
+        starts=[phase for phase in others if phase.ndim == 3],  # of one frame
         sha256=first.target_sha256,
         known=None if job.timed else shared,
         journal=journal,
@@ -81,11 +82,13 @@ def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: 
         watch = cost.start(job.device, ready.pid)
         output, stopped = _within_budget(method, solve, handle)
         taken = watch.stop()
-    phase, channels = from_numpy(output), len(handle.spec.wavelengths)
-    if not is_plain(phase) or tuple(phase.shape[:2]) != (1, channels):
-        raise wrong_output(label, "solve", phase, f"a phase (1, {channels}, H, W)")
+    output, channels = from_numpy(output), len(handle.spec.wavelengths)
+    phase = single(output, channels) if is_plain(output) else None
+    if phase is None:
+        frames = "" if handle.spec.frames == 1 else f", or frames (1, F, {channels}, H, W)"
+        raise wrong_output(label, "solve", output, f"a phase (1, {channels}, H, W){frames}")
     return Solution(
-        phase.detach().cpu()[0],
+        phase.detach().cpu(),
         handle.captures,
         taken,
         stopped,

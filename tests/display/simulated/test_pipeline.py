@@ -120,6 +120,21 @@ def test_noise_depends_on_names_and_frame_not_on_what_is_shown(phase):
     assert not torch.equal(first[0], other[0])
 
 
+def test_frames_share_the_light_and_the_noise_of_one_exposure(with_stage, phase):
+    frames = torch.stack([phase, phase.roll(7, -1), -phase])
+    noise = Sensor(bits=12, full_well=20000, read_noise=40.0)
+    quiet, noisy = (SimulatedBench(with_stage(sensor=sensor)) for sensor in (replace(noise, read_noise=0.0), noise))
+
+    def capture(bench, shown, exposure=3000.0):
+        return bench.session("frames", exposure=(exposure,) * 3).capture(shown).frame
+
+    assert torch.equal(capture(noisy, frames[:1]), capture(noisy, phase))
+    together, alone = capture(quiet, frames), torch.stack([capture(quiet, frame) for frame in frames]).mean(0)
+    assert float((together - alone).abs().mean() / alone.mean()) < 0.03
+    spread = [capture(noisy, shown, 1e-3).std() for shown in (phase, frames)]
+    assert float(spread[1] / spread[0]) == pytest.approx(1, abs=0.1)  # three exposures would have 1 / sqrt(3)
+
+
 @pytest.mark.parametrize("noise", [True, False])
 def test_a_capture_carries_no_gradient(with_stage, phase, noise):
     bench = SimulatedBench(with_stage(sensor=Sensor(noise=noise)))

@@ -42,7 +42,7 @@ def quality(method: Any, spec: DisplaySpec) -> float:
     """PSNR [dB] of what a faultless panel with these levels makes of a photograph."""
     target = Photographs(names=("camera",)).load("camera", spec.region.shape)[1:2].float()
     level = gray_level(method.solve(target[None], Bench(spec))[0], spec.bits).long()
-    shown = spec.level_phases(0)[level]
+    shown = spec.level_phases(0)[level]  # (C, H, W), or frames of it
     image = spec.region.crop(ideal_light(shown, spec))
     return float(psnr(matched(image, target).clamp(0, 1), target))
 
@@ -58,6 +58,12 @@ def test_on_two_levels_annealing_gains_and_the_straight_through_gradient_does_no
     assert rounded == pytest.approx(quality(Wirtinger(), BINARY), abs=1e-4)  # the display rounds as well
     assert quality(Gumbel(), BINARY) > rounded + 4
     assert quality(StraightThrough(), BINARY) < rounded + 1
+
+
+def test_frames_that_are_found_together_gain_on_one_frame() -> None:
+    assert (
+        quality(Gumbel(frames=4, initial_phase="narrow"), BINARY) > quality(Gumbel(initial_phase="narrow"), BINARY) + 3
+    )
 
 
 def test_gumbel_noise_has_the_mean_and_spread_of_its_distribution() -> None:

@@ -56,6 +56,14 @@ def write_rgb(path: Path, levels: Any) -> None:
     assert cv2.imwrite(str(path), np.ascontiguousarray(np.moveaxis(levels, 0, -1)[..., ::-1]))
 
 
+@pytest.mark.parametrize("last", [False, True])
+def test_frames_are_read_as_one_hologram(tmp_path: Path, last: bool) -> None:
+    frames = np.stack([PHASE, PHASE[::-1]])
+    np.save(tmp_path / "frames.npy", np.moveaxis(frames, 1, -1) if last else frames)
+    assert solved(tmp_path / "frames.npy").shape == (2, *SHAPE)
+    assert turns_apart(solved(tmp_path / "frames.npy"), frames) < 1e-6
+
+
 @pytest.mark.parametrize("form", ["rgb.png", "rgb16.png", "rgb.tif", "npy", "last", "float", "npz", "mat", "channels"])
 def test_every_form_of_file_gives_the_phase_that_was_written(tmp_path: Path, form: str) -> None:
     file, params = tmp_path / form, {}

@@ -41,7 +41,8 @@ class Panel(Stage):
     smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn [bits]; pupil: diameter of the iris
     [share of the band 1 / pitch], null for none; blaze: carrier that the display adds and re-centres, vertical and
     horizontal [cycles/px]; region: side of the scored window [share of the panel's]; levels: phase of each level by the
-    maker's table, which methods are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps.
+    maker's table, which methods are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps; frames:
+    the most that the panel shows in one exposure of the camera [count].
     """
 
     title: ClassVar[str] = "panel"
@@ -56,6 +57,7 @@ class Panel(Stage):
     blaze: tuple[float, float] = (0.0, 0.0)
     region: Annotated[float, Interval(gt=0.1, le=1)] = 1.0
     levels: Annotated[tuple[float, ...], Len(0, 1024)] = ()
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
 
     def spec(self, name: str) -> DisplaySpec:
         """The nominal optics of a display of that name."""
@@ -73,7 +75,15 @@ class Panel(Stage):
             region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
             blaze=self.blaze,
             levels=(levels,) * len(self.wavelengths) if levels else (),
+            frames=self.frames,
         )
+
+    def fault_of(self, table: Sequence[float]) -> str:
+        """What is wrong with the length of a table of the panel's levels; empty for none, and for no table."""
+        count = 2**self.bits
+        if len(table) in (0, count):
+            return ""
+        return f"the table has {len(table)} entries; a panel of {self.bits} bits has {count}"
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Gray levels and blaze."""

@@ -1,0 +1,43 @@
+"""What a bench that exists cannot be is refused at its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.bench_file import load_bench_file
+
+BENCH = """name: ours
+version: 1
+panel:
+  shape: [1080, 1920]
+  pitch: 6.4e-6
+  wavelengths: [5.17e-7]
+  distance: 0.1
+  bits: 8
+"""
+
+
+def test_a_panel_of_equal_steps_or_with_a_table_is_read(tmp_path: Path) -> None:
+    (tmp_path / "bench.yaml").write_text(BENCH)
+    assert load_bench_file(tmp_path / "bench.yaml").panel.spec("ours").levels == ()
+    (tmp_path / "bench.yaml").write_text(f"{BENCH}  levels: {[100 * (level / 255) ** 2 for level in range(256)]}\n")
+    ((first, *_, last),) = load_bench_file(tmp_path / "bench.yaml").panel.spec("ours").levels
+    assert (first, last) == (0.0, pytest.approx(2 * 3.14159265 * 255 / 256))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("1080, 1920", "32, 1920", ":4:10: a panel has at least 64 pixels a side"),
+        ("bits: 8", "bits: 4", ":8:9: levels are written with 8 bits, got 4"),
+        ("bits: 8", "bits: 8\n  levels: [0, 100]", ":9:11: the table has 2 entries; a panel of 8 bits has 256"),
+        ("bits: 8", "bits: 8\n  frames: 2", ":9:11: a bench that exists is photographed one frame at a time"),
+    ],
+)
+def test_another_panel_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    (tmp_path / "bench.yaml").write_text(BENCH.replace(old, new))
+    with pytest.raises(UserError, match=message):
+        load_bench_file(tmp_path / "bench.yaml")
