@@ -32,7 +32,7 @@ def test_the_last_hologram_handed_in_is_kept_as_it_was(handle):
 @pytest.mark.parametrize("wrong", [(2, 3, *PANEL), (3, 10, 10)])
 def test_what_no_display_can_show_is_not_kept(handle, wrong):
     handle.keep(torch.ones(3, *PANEL))
-    with pytest.raises(CellError, match="mine: phase (is|has)"):
+    with pytest.raises(CellError, match=r"mine: phase (is|has)"):
         handle.keep(torch.zeros(wrong))
     assert torch.equal(handle.kept, torch.ones(3, *PANEL))
 
