@@ -40,5 +40,5 @@ _solved: dict[object, list[Tensor]] = {}  # those of the last optics
 def _hologram(display: Display, target: Tensor, number: int) -> Tensor:
     handle = MeteredDisplay(display, "fiducial", target, (display.seed, "fiducial", number))
     if display.spec.bits == 1:
-        return Gumbel(iterations=100, initial_phase="random").solve(target[None], handle)[0]
+        return Gumbel(iterations=40, initial_phase="random").solve(target[None], handle)[0]
     return Wirtinger(iterations=30, initial_phase="random").solve(target[None], handle)[0]
