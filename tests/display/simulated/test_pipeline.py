@@ -135,6 +135,19 @@ def test_frames_share_the_light_and_the_noise_of_one_exposure(with_stage, phase)
     assert float(spread[1] / spread[0]) == pytest.approx(1, abs=0.1)  # three exposures would have 1 / sqrt(3)
 
 
+def test_speckle_of_frames_falls_with_the_root_of_their_number(with_stage):
+    """As of independent intensities (Goodman, Speckle Phenomena in Optics, 2007, Section 3.1)."""
+    bench = SimulatedBench(with_stage(sensor=Sensor(bits=16, full_well=1e6, read_noise=0.0)))
+    phases = 2 * torch.pi * torch.rand(16, 3, *PANEL, generator=torch.Generator().manual_seed(3))
+
+    def contrast(count):
+        light = bench.session("speckle", exposure=(3e4,) * 3).capture(phases[:count]).linear()[1]
+        middle = light[light.shape[0] // 4 : -light.shape[0] // 4, light.shape[1] // 4 : -light.shape[1] // 4]
+        return float(middle.std() / middle.mean())
+
+    assert [contrast(count) / contrast(1) for count in (4, 16)] == pytest.approx([0.5, 0.25], rel=0.1)
+
+
 @pytest.mark.parametrize("noise", [True, False])
 def test_a_capture_carries_no_gradient(with_stage, phase, noise):
     bench = SimulatedBench(with_stage(sensor=Sensor(noise=noise)))
