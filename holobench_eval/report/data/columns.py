@@ -27,10 +27,11 @@ CELL: list[Column] = []  # what a cell is, before the scores
 FIGURES: list[Column] = []  # what was measured beside scores, and its origin, after them
 
 
-def _mean_alone(cells: Cells, name: str) -> float:
-    """Over the done cells whose seconds count: what was solved alone if anything was, else all."""
+def _median_alone(cells: Cells, name: str) -> float:
+    """Over the done cells whose seconds count: what was solved alone if anything was, else all. A machine that stood
+    still for minutes does not move it."""
     alone = cells.done[cells.done["timed_alone"] == 1] if "timed_alone" in cells.done else cells.done
-    return float((cells.done if alone.empty else alone)[name].mean())
+    return float((cells.done if alone.empty else alone)[name].median())
 
 
 def _together(cells: Cells, name: str) -> str:
@@ -204,7 +205,8 @@ def clusters(cells: Cells, name: str) -> int:
 
 
 _CAPTURES = "Captures while solving, mean over cells"
-_SOLVING = "Time to solve a target, mean over the cells timed alone, or over all"
+_SOLVING = "Time to solve a target, median over the cells timed alone, or over all"
+_PROCESSORS = "Time of all processors that solving took, median over cells"
 _TRAINING = "Captures of the training, once for all targets"
 _SECONDS = "Time of the training"
 _LEARNED = "Digests of what was learned, with spaces between them"
@@ -216,7 +218,7 @@ def captures(record: Record, layout: Layout) -> int | None:
     return None if layout.measure == FILES else record.get("captures")  # of somebody else, it is not known
 
 
-@column(FIGURES, "number", table=_mean_alone, table_meaning=_SOLVING, heading="seconds per {each}")
+@column(FIGURES, "number", table=_median_alone, table_meaning=_SOLVING, heading="seconds per {each}")
 def solving_s(record: Record, layout: Layout) -> float | None:
     """Time to solve the target, of the solving that made the phase, in this run or an earlier one."""
     return record.get("seconds")
@@ -250,7 +252,9 @@ def memory_mib(record: Record, layout: Layout) -> float | None:
     return record.get("memory_mib")
 
 
-@column(FIGURES, "number", kept=if_known, table=mean, heading="processor seconds per {each}")
+@column(
+    FIGURES, "number", kept=if_known, table=median, table_meaning=_PROCESSORS, heading="processor seconds per {each}"
+)
 def cpu_s(record: Record, layout: Layout) -> float | None:
     """Time of all processors that solving took, on one or more cores."""
     return record.get("cpu_s")
