@@ -103,6 +103,9 @@ class DisplaySpec:
         Phase of every level by the maker's table, a colour [rad]; empty: equal steps, ``2^bits`` to a turn.
     frames
         Most frames that the panel shows in one exposure, whose light adds up.
+    spectrum
+        Lines of the source, a colour, as many of each: offset from its wavelength [m] and share of the power; their
+        light adds up in intensity. Empty: a single line.
     """
 
     name: str
@@ -117,6 +120,7 @@ class DisplaySpec:
     blaze: tuple[float, float] = (0.0, 0.0)
     levels: tuple[tuple[float, ...], ...] = ()
     frames: int = 1
+    spectrum: tuple[tuple[tuple[float, float], ...], ...] = ()
 
     def level_phases(self, channel: int) -> Tensor:
         """Nominal phase of every level of a colour, ``(2^bits,)`` [rad]. A display shows level ``g`` where it is given
@@ -133,7 +137,11 @@ class DisplaySpec:
         return torch.arange(2**self.bits) * (TAU / 2**self.bits)
 
     def propagator(
-        self, channel: int, dtype: torch.dtype = torch.complex64, device: torch.device | str = "cpu"
+        self,
+        channel: int,
+        dtype: torch.dtype = torch.complex64,
+        device: torch.device | str = "cpu",
+        offset: float = 0.0,
     ) -> AngularSpectrum:
         """The ideal propagator of a colour channel, panel to image plane (cached).
 
@@ -143,13 +151,17 @@ class DisplaySpec:
             Index of the wavelength.
         dtype, device
             Those of the fields that it propagates.
+        offset
+            Of a line from that wavelength [m]: the blaze, a grating, turns it off the axis.
         """
-        return _propagator(self, channel, dtype, torch.device(device))
+        return _propagator(self, channel, dtype, torch.device(device), offset)
 
 
-@lru_cache(maxsize=16)
-def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device) -> AngularSpectrum:
-    wavelength = spec.wavelengths[channel]
+@lru_cache(maxsize=24)
+def _propagator(
+    spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device, offset: float
+) -> AngularSpectrum:
+    wavelength = spec.wavelengths[channel] + offset
     model = AngularSpectrum(
         shape=spec.shape,
         pitch=spec.pitch,
@@ -163,6 +175,11 @@ def _propagator(spec: DisplaySpec, channel: int, dtype: torch.dtype, device: tor
         fy, fx = frequencies(model.padded_shape, spec.pitch, device)
         eye = refocus(spec.eye, fy, fx, wavelength, spec.distance)
         model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(eye), eye).to(dtype))
+    if offset and any(spec.blaze):
+        fy, fx = frequencies(model.padded_shape, spec.pitch, device)
+        y, x = (spec.distance * offset * cycles / spec.pitch for cycles in spec.blaze)
+        moved = -TAU * (fy * y + fx * x)
+        model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(moved), moved).to(dtype))
     return model
 
 

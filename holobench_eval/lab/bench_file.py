@@ -55,8 +55,8 @@ def load_bench_file(path: Path) -> BenchFile:
         raise document.error(("panel", "shape"), f"a panel has at least {SMALLEST_PANEL} pixels a side")
     if bench.panel.bits != 8:
         raise document.error(("panel", "bits"), f"levels are written with 8 bits, got {bench.panel.bits}")
-    if fault := bench.panel.fault_of(bench.panel.levels):
-        raise document.error(("panel", "levels"), fault)
+    for key, fault in bench.panel.faults():
+        raise document.error(("panel", key), fault)
     if bench.panel.frames != 1:
         raise document.error(("panel", "frames"), "a bench that exists is photographed one frame at a time")
     told, capture = document.text, bench.capture

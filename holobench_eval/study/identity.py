@@ -35,7 +35,11 @@ from .versions import GIVEN, GIVEN_GRAY, HARNESS, PHOTOGRAPHS
 
 Plain = dict[str, Any]
 BASIS = ("given", "target", "optics", "draw")  # entries of a phase that are not of its method
-LATER = {"levels": (), "frames": 1}  # nominal optics that came later: a display without them keeps its names
+LATER = {
+    "levels": (),
+    "frames": 1,
+    "spectrum": (),
+}  # nominal optics that came later: a display without them keeps its names
 SPECKLE = "speckle_contrast"
 # What the protocol gives beside its metrics: the match of a capture with its target, and the move that refines both.
 MATCH, REFINED = "match", "refine"

@@ -7,6 +7,7 @@ parameters of its own, so that Eq. 13, |P(H) + R|^2, is kept as it stands: a com
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -95,12 +96,20 @@ class DisplayModel(nn.Module):
     def over_panel(self, phase: Tensor) -> Tensor:
         """The same in the entire image plane, ``(C, H, W)``."""
         maps = self._maps()
-        shown = phase if self.ramp is None else phase + self.ramp
-        panel = lit(self._driven(shown) * maps.gain, maps.taps, self.spec.blaze)
+        return self._image(self._shown(phase, maps), maps, (0.0,) * len(phase))
+
+    def _shown(self, phase: Tensor, maps: Maps) -> Tensor:
+        """Phase that the panel has at the nominal wavelengths, ``(C, H, W)``."""
+        return self._driven(phase if self.ramp is None else phase + self.ramp) * maps.gain
+
+    def _image(self, shown: Tensor, maps: Maps, offsets: Sequence[float]) -> Tensor:
+        """Field ``(C, H, W)`` of a line beside each wavelength [m], of the phase that the panel has."""
+        panel = lit(shown, maps.taps, self.spec.blaze)
         panel = (panel + torch.view_as_complex(self.undiffracted)[:, None, None]) * maps.light
         if self.ramp is not None:  # the optical axis follows the blaze
             panel = panel * phasor(self.ramp.new_ones(()), -self.ramp)
-        plane = torch.stack([self._propagator(colour).forward(field) for colour, field in enumerate(panel)])
+        models = (self._propagator(colour, offset) for colour, offset in enumerate(offsets))
+        plane = torch.stack([model.forward(field) for model, field in zip(models, panel, strict=True)])
         return torch.fft.ifft2(torch.fft.fft2(plane) * maps.pupil) * maps.amplitude
 
     def _maps(self) -> Maps:
@@ -127,8 +136,8 @@ class DisplayModel(nn.Module):
             torch.exp(self.brightness / 2)[:, None, None],
         )
 
-    def _propagator(self, channel: int) -> AngularSpectrum:
-        return self.spec.propagator(channel, device=self.table.device)
+    def _propagator(self, channel: int, offset: float) -> AngularSpectrum:
+        return self.spec.propagator(channel, device=self.table.device, offset=offset)
 
     def _driven(self, phase: Tensor) -> Tensor:
         """Phase that each level stands for, by the look-up table."""

@@ -45,7 +45,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "wirtinger_gamma": {"images": 1, "of": _EARLY},
     "wirtinger_veil": {"iterations": 6},
     "nearest_level": {"start": _EARLY},
-    **{key: {"iterations": 6} for key in ("straight_through", "gumbel")},
+    **{key: {"iterations": 6} for key in ("straight_through", "gumbel", "partially_coherent")},
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding
     "online_camera": {"captures": 24, "start": _START},
@@ -60,7 +60,10 @@ QUICK: dict[str, dict[str, Any]] = {
     },
     "hil_plus": {"network": _SMALL, **_CALIBRATED},
     "hil_terms": {"network": {**_SMALL, "name": "unet"}, **_CALIBRATED},
-    **{key: {**_CALIBRATED, "patterns": 2} for key in ("parametric_model", "learned_kernel")},
+    **{
+        key: {**_CALIBRATED, "patterns": 2}
+        for key in ("parametric_model", "partially_coherent_model", "learned_kernel")
+    },
     **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
     **{
         key: {"training": {"steps": 8}, "retrieval": {"iterations": 3}, "start": _EARLY}

@@ -197,9 +197,10 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
 def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     """The profile of a file, with the values of those it is like. UserError: a fault, with file:line:column."""
     profile = typed(document, Profile, values)
-    for stage, key, table in (("panel", "levels", profile.panel.levels), ("lut", "table", profile.lut.table)):
-        if fault := profile.panel.fault_of(table):
-            raise document.error((stage, key), fault)
+    for key, fault in profile.panel.faults():
+        raise document.error(("panel", key), fault)
+    if fault := profile.panel.fault_of(profile.lut.table):
+        raise document.error(("lut", "table"), fault)
     if profile.lut.bend and profile.lut.table:
         raise document.error(("lut", "bend"), "a table has no exponent to bend; give gamma in the place of the table")
     if min(profile.lut.gamma) < SMALLEST_GAMMA + STEEPEST * profile.lut.bend:

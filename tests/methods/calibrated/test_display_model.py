@@ -203,7 +203,7 @@ def test_these_are_all_the_numbers() -> None:
 def test_the_gradient_of_every_number_equals_finite_differences(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = spec_of(pupil=0.8)
     precise = [spec.propagator(channel, dtype=torch.complex128) for channel in range(2)]
-    monkeypatch.setattr(DisplayModel, "_propagator", lambda self, channel: precise[channel])
+    monkeypatch.setattr(DisplayModel, "_propagator", lambda self, channel, offset: precise[channel])
     model, phase = detuned(spec), smooth_phase(spec).double().requires_grad_()
     weights = torch.rand(2, *spec.region.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
 

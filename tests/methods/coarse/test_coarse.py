@@ -19,22 +19,10 @@ from holobench_eval.methods.common import matched
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics.psnr import psnr
 from holobench_eval.optics.phase import gray_level
+from tests.support.open_loop import Bench
 
 BINARY = replace(load_profile("ideal").spec((128, 128)), bits=1, wavelengths=(517e-9,))
 TABULATED = replace(load_profile("plm-4bit").spec((128, 128)), wavelengths=(517e-9,), pupil=None)
-
-
-class Bench:
-    """Nominal optics and random numbers, and nothing kept."""
-
-    def __init__(self, spec: DisplaySpec) -> None:
-        self.spec = spec
-
-    def generator(self, *names: object) -> torch.Generator:
-        return torch.Generator().manual_seed(len(repr(names)))
-
-    def solved(self, method: Any, target: torch.Tensor) -> torch.Tensor:
-        return method.solve(target, self)
 
 
 @cache

@@ -13,12 +13,14 @@ from ....core.units import Check, Metres
 from ....optics.phase import TAU, gray_level, wrap
 from ...api import DisplaySpec, Region
 from ..stage import Effect, Stage
+from .spectrum import Width, gaussian_line
 
 if TYPE_CHECKING:
     from ..profile import Profile
 
 
 Wavelength = Annotated[float, Metres(200e-9, 2000e-9)]
+TOLD_LINES = 7  # by which methods are told of a line
 
 
 class OneOrThree(Check):
@@ -42,7 +44,8 @@ class Panel(Stage):
     [share of the band 1 / pitch], null for none; blaze: carrier that the display adds and re-centres, vertical and
     horizontal [cycles/px]; region: side of the scored window [share of the panel's]; levels: phase of each level by the
     maker's table, which methods are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps; frames:
-    the most that the panel shows in one exposure of the camera [count].
+    the most that the panel shows in one exposure of the camera [count]; linewidth: full width at half maximum of each
+    wavelength by the source's data sheet, which methods are told [m]; none for single lines.
     """
 
     title: ClassVar[str] = "panel"
@@ -58,6 +61,7 @@ class Panel(Stage):
     region: Annotated[float, Interval(gt=0.1, le=1)] = 1.0
     levels: Annotated[tuple[float, ...], Len(0, 1024)] = ()
     frames: Annotated[int, Interval(ge=1, le=256)] = 1
+    linewidth: Annotated[tuple[Width, ...], Len(0, 3)] = ()
 
     def spec(self, name: str) -> DisplaySpec:
         """The nominal optics of a display of that name."""
@@ -76,7 +80,16 @@ class Panel(Stage):
             blaze=self.blaze,
             levels=(levels,) * len(self.wavelengths) if levels else (),
             frames=self.frames,
+            spectrum=tuple(tuple(gaussian_line(width, TOLD_LINES)) for width in self.linewidth),
         )
+
+    def faults(self) -> Iterator[tuple[str, str]]:
+        """What does not go together: key and fault."""
+        if fault := self.fault_of(self.levels):
+            yield "levels", fault
+        widths, colours = len(self.linewidth), len(self.wavelengths)
+        if widths not in (0, colours):
+            yield "linewidth", f"there are {widths} widths; the panel has {colours} wavelengths"
 
     def fault_of(self, table: Sequence[float]) -> str:
         """What is wrong with the length of a table of the panel's levels; empty for none, and for no table."""

@@ -80,9 +80,14 @@ class Spectrum(Stage):
             total = sum(share for _, share in self.measured[channel])
             pairs = [(offset, share / total) for offset, share in self.measured[channel]]
         elif self.width[channel] and self.lines > 1:
-            nodes, weights = np.polynomial.hermite_e.hermegauss(self.lines)
-            offsets = nodes * self.width[channel] / FWHM
-            pairs = list(zip(offsets.tolist(), (weights / weights.sum()).tolist(), strict=True))
+            pairs = gaussian_line(self.width[channel], self.lines)
         else:
             pairs = [(0.0, 1.0)]
         return sorted(pairs, key=lambda pair: (abs(pair[0]), pair[0]))
+
+
+def gaussian_line(width: float, lines: int) -> list[tuple[float, float]]:
+    """Offset [m] and share of the power of ``lines`` wavelengths that stand for a Gaussian line of full width at half
+    maximum ``width`` [m], by Gauss-Hermite quadrature."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(lines)
+    return list(zip((nodes * width / FWHM).tolist(), (weights / weights.sum()).tolist(), strict=True))

@@ -1,0 +1,1 @@
+"""Methods for sources of more than one wavelength, whose light adds up in intensity."""
