@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ..display.api import DisplaySpec
-from ..optics import AngularSpectrum
+from ..optics import Propagator
 from ..optics.phase import TAU, wrap
 from ..optics.phasor import phasor
 
@@ -39,7 +39,7 @@ def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) 
     return torch.stack([solve_channel(colour.contiguous(), channel) for channel, colour in colours], dim=-3)
 
 
-def nominal_model(bench: Bench, channel: int, like: Tensor) -> AngularSpectrum:
+def nominal_model(bench: Bench, channel: int, like: Tensor) -> Propagator:
     """The ideal propagator of a channel, in the precision and on the device of ``like``."""
     return bench.spec.propagator(channel, dtype=torch.complex(like, like).dtype, device=like.device)
 

@@ -37,6 +37,7 @@ class DoublePhase:
     offset: Offset = "centre"
 
     title: ClassVar[str] = "double-phase encoding"
+    fresnel: ClassVar[bool] = True
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
 

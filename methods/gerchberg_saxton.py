@@ -13,7 +13,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..display.api import Region
-from ..optics import AngularSpectrum
+from ..optics import Propagator
 from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
 from .initial_phase import InitialPhase, initial_phase
 
@@ -73,13 +73,13 @@ class GerchbergSaxton:
         return with_offset(phase, self.offset)
 
 
-def as_bright(target: Tensor, phase: Tensor, model: AngularSpectrum, region: Region) -> Tensor:
+def as_bright(target: Tensor, phase: Tensor, model: Propagator, region: Region) -> Tensor:
     """The target's amplitude ``(B, h, w)``, with as much light as ``phase`` sends into the region."""
     light = region.crop(model.forward(unit_field(phase))).abs().square().sum(dim=(-2, -1), keepdim=True)
     return (target.clamp_min(0) * light / target.sum(dim=(-2, -1), keepdim=True).clamp_min(1e-12)).sqrt()
 
 
-def step(phase: Tensor, amplitude: Tensor, model: AngularSpectrum, region: Region) -> tuple[Tensor, Tensor]:
+def step(phase: Tensor, amplitude: Tensor, model: Propagator, region: Region) -> tuple[Tensor, Tensor]:
     """One iteration: the new phase, and the squared error ``(B,)`` of the amplitude before it.
 
     Only the correction inside the region travels back, and is added to the field that is there. This equals

@@ -57,6 +57,7 @@ class MultiPlane:
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     planes: ClassVar[bool] = True
+    fresnel: ClassVar[bool] = True
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """One plane, that of the display: linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""

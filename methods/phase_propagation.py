@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from ..display.api import Region
-from ..optics import AngularSpectrum
+from ..optics import Propagator
 from ..optics.blocks import in_blocks
 from . import kernels
 from .common import TINY
@@ -22,13 +22,13 @@ class PhasePropagation:
     no longer than to read it from memory. Raises ValueError for a phase of another size than the propagator's.
     """
 
-    def __init__(self, model: AngularSpectrum, region: Region, phase: Tensor) -> None:
+    def __init__(self, model: Propagator, region: Region, phase: Tensor) -> None:
         if tuple(phase.shape[-2:]) != model.shape:
             raise ValueError(f"phase is {tuple(phase.shape[-2:])}, the propagator was made for {model.shape}")
-        self._transfer, self._region, self._phase = model.transfer, region, phase
-        light = torch.empty(phase.shape, dtype=model.transfer.dtype, device=phase.device)
+        self._model, self._region, self._phase = model, region, phase
+        light = torch.empty(phase.shape, dtype=model.dtype, device=phase.device)
         in_rows(kernels.unit_rows, _unit_field, light, phase)
-        self._image = self._transfer.convolve(light, spent=True)
+        self._image = model.carried(light, spent=True)
 
     def weigh(self, loss: Loss, target: Tensor) -> Tensor:
         """The loss L ``(B,)`` of ``I = |E|^2`` in the region; ``2 dL/dI E`` takes the place of the image.
@@ -47,7 +47,7 @@ class PhasePropagation:
 
     def phase_gradient(self) -> Tensor:
         """``Re(-i exp(-i phi) P*(image))``, ``(B, H, W)``, of what is at the image by now; only once."""
-        returned = self._transfer.convolve(self._image, conjugated=True, spent=True)
+        returned = self._model.carried(self._image, back=True, spent=True)
         gradient = torch.empty(returned.shape, dtype=self._phase.dtype, device=returned.device)
         in_rows(kernels.gradient_rows, _gradient, returned, self._phase, gradient)
         return gradient

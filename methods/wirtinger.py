@@ -14,7 +14,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..display.api import Region
-from ..optics import AngularSpectrum
+from ..optics import Propagator
 from .common import Bench, Offset, nominal_model, per_channel, with_offset
 from .descent import Best, adam
 from .initial_phase import InitialPhase, initial_phase
@@ -29,7 +29,7 @@ class Objective:
     All have the model's precision.
     """
 
-    model: AngularSpectrum
+    model: Propagator
     region: Region
     target: Tensor
     loss: Loss

@@ -13,12 +13,14 @@ from torch import Tensor
 from torch.nn import Parameter
 
 from ..imaging.register import Registration
-from ..optics import AngularSpectrum
+from ..optics import AngularSpectrum, FourierLens, Propagator
 from ..optics.convolution import frequencies
+from ..optics.fourier import picture_pitch
 from ..optics.phase import TAU, Matrix, refocus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
+Plane = Literal["fresnel", "fourier"]
 DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite
 
 
@@ -88,7 +90,7 @@ class DisplaySpec:
     wavelengths
         One a colour channel [m].
     distance
-        From the panel to the image plane [m].
+        From the panel to the image plane [m]; of a Fourier plane, the focal length of the lens between them.
     bits
         Of the panel.
     pupil
@@ -106,6 +108,8 @@ class DisplaySpec:
     spectrum
         Lines of the source, a colour, as many of each: offset from its wavelength [m] and share of the power; their
         light adds up in intensity. Empty: a single line.
+    plane
+        "fresnel": free space between panel and image; "fourier": the back focal plane of a lens.
     """
 
     name: str
@@ -121,6 +125,14 @@ class DisplaySpec:
     levels: tuple[tuple[float, ...], ...] = ()
     frames: int = 1
     spectrum: tuple[tuple[tuple[float, float], ...], ...] = ()
+    plane: Plane = "fresnel"
+
+    @property
+    def image_pitch(self) -> float:
+        """From pixel to pixel of the image [m]: that of the panel, or ``optics.fourier.picture_pitch``."""
+        if self.plane == "fresnel":
+            return self.pitch
+        return picture_pitch(self.shape, self.pitch, self.wavelengths, self.distance)
 
     def level_phases(self, channel: int) -> Tensor:
         """Nominal phase of every level of a colour, ``(2^bits,)`` [rad]. A display shows level ``g`` where it is given
@@ -142,7 +154,7 @@ class DisplaySpec:
         dtype: torch.dtype = torch.complex64,
         device: torch.device | str = "cpu",
         offset: float = 0.0,
-    ) -> AngularSpectrum:
+    ) -> Propagator:
         """The ideal propagator of a colour channel, panel to image plane (cached).
 
         Parameters
@@ -154,11 +166,24 @@ class DisplaySpec:
         offset
             Of a line from that wavelength [m]: the blaze, a grating, turns it off the axis.
         """
-        return _propagator(self, channel, dtype, torch.device(device), offset)
+        nominal = _free_space if self.plane == "fresnel" else _through_lens
+        return nominal(self, channel, dtype, torch.device(device), offset)
+
+    def transfer(self, channel: int) -> Tensor:
+        """Transfer function of ``propagator`` on its padded grid, complex64, where the image is in a Fresnel plane."""
+        return _free_space(self, channel, torch.complex64, torch.device("cpu"), 0.0).transfer.values
 
 
 @lru_cache(maxsize=24)
-def _propagator(
+def _through_lens(
+    spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device, offset: float
+) -> FourierLens:
+    wavelength = spec.wavelengths[channel] + offset
+    return FourierLens(spec.shape, spec.pitch, wavelength, spec.distance, spec.image_pitch, dtype, device)
+
+
+@lru_cache(maxsize=24)
+def _free_space(
     spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device, offset: float
 ) -> AngularSpectrum:
     wavelength = spec.wavelengths[channel] + offset

@@ -15,7 +15,7 @@ def refuse_far(spec: DisplaySpec, distance: float) -> None:
     A panel of N pixels of pitch p resolves ``wavelength z / (N p)`` at the distance z (Goodman, Introduction to Fourier
     Optics, 4.4). distance: that of the full panel [m], as the display's file has it.
     """
-    if min(spec.region.shape) < SMALLEST_REGION:  # too small for circles at any distance
+    if spec.plane == "fourier" or min(spec.region.shape) < SMALLEST_REGION:  # sharp, or too small, at any distance
         return
     spot = max(spec.wavelengths) * spec.distance / (min(spec.shape) * spec.pitch**2)
     limit = COARSEST * fiducial(spec.region.shape).spacing

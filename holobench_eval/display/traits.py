@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 from ..core.errors import UserError
+from .api import DisplaySpec
 
 Function = Literal["solve", "solve_planes", "predict", "prepare", "estimates", "available", "files", "external"]
 FUNCTIONS: tuple[Function, ...] = get_args(Function)
@@ -17,9 +18,10 @@ class Traits:
     """What the class of a method declares; the defaults are those of a class that declares nothing.
 
     camera: captures while it solves; privileged: may see the simulated bench; trains: learns first; follows: is solved
-    after all others; planes: solves all planes of a scene at once; form: effects that its model of the display has
-    parameters for; title: its name for people; tuned: what its defaults were chosen on; version: of the numbers it
-    gives; timed: False where its seconds mean nothing; functions: those that it has.
+    after all others; planes: solves all planes of a scene at once; fresnel: needs the image in a Fresnel plane; form:
+    effects that its model of the display has parameters for; title: its name for people; tuned: what its defaults were
+    chosen on; version: of the numbers it gives; timed: False where its seconds mean nothing; functions: those that it
+    has.
     """
 
     camera: bool = False
@@ -27,6 +29,7 @@ class Traits:
     trains: bool = False
     follows: bool = False
     planes: bool = False
+    fresnel: bool = False
     form: frozenset[str] | None = None
     title: str | None = None
     tuned: str | None = None
@@ -70,3 +73,12 @@ def traits_of(method: object, name: str = "") -> Traits:
             raise UserError(f"method '{name or cls.__name__}': {flag} should be {wanted}")
     has = frozenset(function for function in FUNCTIONS if callable(getattr(method, function, None)))
     return Traits(**declared | {"functions": has})
+
+
+def refuse_plane(traits: Traits, name: str, spec: DisplaySpec) -> None:
+    """UserError for a method of that name that needs a Fresnel plane, on a display with its image in another."""
+    if traits.fresnel and spec.plane != "fresnel":
+        raise UserError(
+            f"method '{name}' needs the image in a Fresnel plane; '{spec.name}' has it in the Fourier plane of a lens, "
+            "for which gerchberg_saxton, wirtinger and sgd are"
+        )

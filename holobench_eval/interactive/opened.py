@@ -21,7 +21,7 @@ from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
 from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, type_name
 from ..display.phases import check_phase, phase_doubt, single
-from ..display.traits import traits_of
+from ..display.traits import refuse_plane, traits_of
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .described import CAPTURE, IDEAL, PHASE, TARGET, Array, Described, described
@@ -104,6 +104,7 @@ class OpenDisplay:
         solver, label = self._solver(method, params)
         if traits_of(solver, label).trains:
             raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
+        refuse_plane(traits_of(solver, label), label, self.spec)
         handle = self._bench.for_method(solver, label, light, _name(light), 0)
         try:
             with self._threads():

@@ -3,6 +3,7 @@
 from .angular_spectrum import AngularSpectrum
 from .colour import srgb_decode, srgb_encode
 from .convolution import Propagator
+from .fourier import FourierLens
 from .fresnel import Fresnel
 from .phase import blaze, lens, quantise, wrap
 from .point_source import PointSource
@@ -10,6 +11,7 @@ from .zernike import zernike
 
 __all__ = [
     "AngularSpectrum",
+    "FourierLens",
     "Fresnel",
     "PointSource",
     "Propagator",

@@ -15,12 +15,29 @@ from .transfer import TransferFunction
 class Propagator(Protocol):
     """A linear map between two planes, and its adjoint."""
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the fields."""
+        ...
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """Of the fields, complex."""
+        ...
+
     def forward(self, field: Tensor) -> Tensor:
         """Propagate a complex field ``(..., H, W)`` from the panel to the image plane."""
         ...
 
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint map: ``<forward(u), v> = <u, adjoint(v)>``."""
+        ...
+
+    def carried(self, field: Tensor, back: bool = False, spent: bool = False) -> Tensor:
+        """``forward`` or, back, ``adjoint``, of a field in the precision of the model, where no gradient is asked for.
+
+        spent: the result may take the place of the field in memory.
+        """
         ...
 
 
@@ -43,6 +60,11 @@ class Convolution:
         self.transfer = transfer
 
     @property
+    def dtype(self) -> torch.dtype:
+        """Of the fields, complex."""
+        return self.transfer.dtype
+
+    @property
     def padded_shape(self) -> tuple[int, int]:
         """(rows, columns) of the transform."""
         return self.transfer.shape
@@ -54,6 +76,10 @@ class Convolution:
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint of ``forward``; for a pure phase transfer function this propagates back."""
         return self._convolve(field, conjugated=True)
+
+    def carried(self, field: Tensor, back: bool = False, spent: bool = False) -> Tensor:
+        """See ``Propagator``."""
+        return self.transfer.convolve(field, back, spent)
 
     def _convolve(self, field: Tensor, conjugated: bool) -> Tensor:
         if tuple(field.shape[-2:]) != self.shape:

@@ -16,14 +16,14 @@ from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
 from ..display.simulated.changes import KINDS, Value, altered, checked
 from ..display.simulated.profile import load_profile
-from ..display.traits import traits_of
+from ..display.traits import refuse_plane, traits_of
 from ..imaging.grid import SMALLEST_REGION
 from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
 from .definition import PREDICTIONS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
-from .displays import condition, displays, real_condition
+from .displays import Condition, condition, displays, real_condition
 from .focal_stacks import SCORES, planes_of
 from .identity import SPECKLE
 from .plan import FLOORS, REFERENCE, is_reference
@@ -188,7 +188,7 @@ def _check_profiles(study: Study, document: Document) -> None:
         where: Keys = ("display", "bench") if bench else ("display", "profiles", index)
         where = ("display", "learned", "profile") if learned else where
         with placed(document, where, where):
-            display = real_condition(bench, study.folder) if bench else condition(profile, panel, study.folder)
+            display = _condition(study, profile)
             if (taken := REFERENCE if is_reference(display.name) else display.name) in seen:
                 both = f"'{profile}' and '{seen[taken]}' are both named '{display.name}'"
                 raise UserError(f"{both}; list each display once")
@@ -200,6 +200,11 @@ def _check_profiles(study: Study, document: Document) -> None:
                 message += f", which a panel of {list(_smallest_panel(profile, panel, study.folder))} has"
             raise document.error(("display", "panel"), message)
         seen[name] = profile
+
+
+def _condition(study: Study, source: str) -> Condition:
+    bench, panel = study.display.bench, study.display.panel
+    return real_condition(bench, study.folder) if bench else condition(source, panel, study.folder)
 
 
 def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[int, int]:
@@ -225,6 +230,8 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
             raise UserError(f"'{entry.name}' {what}; a study with 'isolation: none' runs it")
         if study.display.real and traits.privileged:
             raise UserError(f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one")
+        for source in entry.profiles or study.display.sources:
+            refuse_plane(traits, entry.name, _condition(study, source).spec)
     if entry.captures is not None and (not traits.camera or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)

@@ -39,6 +39,7 @@ LATER = {
     "levels": (),
     "frames": 1,
     "spectrum": (),
+    "plane": "fresnel",
 }  # nominal optics that came later: a display without them keeps its names
 SPECKLE = "speckle_contrast"
 # What the protocol gives beside its metrics: the match of a capture with its target, and the move that refines both.

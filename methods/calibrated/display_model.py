@@ -19,7 +19,7 @@ from torch.nn.utils import parameters_to_vector
 from ...core.graphs import is_recorded
 from ...display.api import DisplaySpec
 from ...imaging.shifts import correlate_each
-from ...optics import AngularSpectrum
+from ...optics import Propagator
 from ...optics.phase import TAU, blaze, wrap
 from ...optics.phasor import mean_phasor, phasor
 from ...optics.zernike import NAMES, zernike
@@ -136,7 +136,7 @@ class DisplayModel(nn.Module):
             torch.exp(self.brightness / 2)[:, None, None],
         )
 
-    def _propagator(self, channel: int, offset: float) -> AngularSpectrum:
+    def _propagator(self, channel: int, offset: float) -> Propagator:
         return self.spec.propagator(channel, device=self.table.device, offset=offset)
 
     def _driven(self, phase: Tensor) -> Tensor:

@@ -29,7 +29,7 @@ class Kernels(nn.Module):
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__()
         self.spec = spec
-        ideal = [spec.propagator(channel).transfer.values for channel in range(len(spec.wavelengths))]
+        ideal = [spec.transfer(channel) for channel in range(len(spec.wavelengths))]
         self.transfer = nn.ParameterList(
             torch.view_as_real(transfer).clone(memory_format=torch.contiguous_format) for transfer in ideal
         )

@@ -72,6 +72,7 @@ class ThroughModel(ABC):
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
+    fresnel: ClassVar[bool] = True
     version: ClassVar[int] = 3
 
     def external(self) -> dict[str, Path | None]:

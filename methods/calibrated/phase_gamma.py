@@ -185,3 +185,4 @@ class DoublePhaseGamma(PhaseGamma):
     of: DoublePhase = DoublePhase()
 
     title: ClassVar[str] = "double-phase encoding through a phase gamma"
+    fresnel: ClassVar[bool] = True

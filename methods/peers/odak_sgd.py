@@ -48,6 +48,7 @@ class OdakSGD:
     title: ClassVar[str] = "gradient descent of odak"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
+    fresnel: ClassVar[bool] = True
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""

@@ -59,6 +59,7 @@ class TorchOpticsAdam:
     title: ClassVar[str] = "Adam through TorchOptics"
     camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = False
+    fresnel: ClassVar[bool] = True
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""

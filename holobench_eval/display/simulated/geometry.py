@@ -16,7 +16,8 @@ class Geometry:
 
     samples: sub-samples per pixel and axis at the panel. seed: names that every fixed random pattern hangs from.
     blaze: (vertical, horizontal) cycles per pixel that the optical axis follows; detuning: of the wavelength from the
-    one that axis and panel are set for [m].
+    one that axis and panel are set for [m]; image_pitch: of an image in a Fourier plane [m], where distance is the
+    focal length; None in a Fresnel plane.
     """
 
     shape: tuple[int, int]
@@ -28,6 +29,7 @@ class Geometry:
     seed: tuple[object, ...]
     blaze: tuple[float, float] = (0.0, 0.0)
     detuning: float = 0.0
+    image_pitch: float | None = None
 
     def generator(self, *names: object) -> torch.Generator:
         """Named random numbers of this bench, the same for every channel unless ``names`` hold the channel."""

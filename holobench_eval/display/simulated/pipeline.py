@@ -20,6 +20,7 @@ from ...optics.phase import blaze
 from ...optics.phasor import squared_modulus
 from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
+from .fourier_path import FourierPath
 from .fused_path import quickest
 from .geometry import Geometry
 from .noise import normal
@@ -76,7 +77,6 @@ class SimulatedBench:
         self.image_samples = min(profile.sampling, IMAGE_SAMPLES)
         names = ("bench", profile.name, profile.seed)
         self.ramp = blaze(panel.shape, panel.blaze)
-        self.weights = sample_weights(self._padded(), self.samples, panel.blaze, hold=profile.aperture is not None)
         self.crosstalk = profile.crosstalk.weights(self.samples)
         aperture, order = profile.aperture, profile.zero_order
         active = aperture.active_share(self.samples) if aperture else torch.ones(self.samples**2, 1, 1)
@@ -85,7 +85,17 @@ class SimulatedBench:
         self.modulated = (order.modulated * active).view(grid).to(device)
         self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid).to(device, torch.complex64)
         geometries = [
-            Geometry(panel.shape, panel.pitch, wavelength, panel.distance, self.samples, index, names, panel.blaze)
+            Geometry(
+                shape=panel.shape,
+                pitch=panel.pitch,
+                wavelength=wavelength,
+                distance=panel.distance,
+                samples=self.samples,
+                channel=index,
+                seed=names,
+                blaze=panel.blaze,
+                image_pitch=self.spec.image_pitch if panel.plane == "fourier" else None,
+            )
             for index, wavelength in enumerate(panel.wavelengths)
         ]
         geometry = geometries[0]
@@ -94,8 +104,9 @@ class SimulatedBench:
         self.lines = tuple(tuple(maps) for maps in lines)
         self.channels = tuple(lines[0] for lines in self.lines)
         self.drift_gain = profile.drift.phase_gain(geometry)
-        points = today.relay.panel_points(panel.shape, panel.pitch, profile.sensor.pitch, window=self.spec.region.shape)
-        self.grid = sampling_grid(points, panel.shape).to(device)
+        pitches = (self.spec.image_pitch, profile.sensor.pitch)
+        points = today.relay.panel_points(panel.shape, *pitches, window=self.spec.region.shape)
+        self.grid = sampling_grid(points + torch.tensor(panel.offset), panel.shape).to(device)
         fine = [self.image_samples * size for size in panel.shape]
         self.fine_grid = finer_grid(self.grid, fine, self.image_samples)
         self.response = profile.sensor.response((points.shape[0], points.shape[1]), geometry)
@@ -113,25 +124,6 @@ class SimulatedBench:
         incident = reduce(mul, present(stage.panel(geometry) for stage in stages)) * demodulation
         if profile.drift.days:
             incident = incident * profile.drift.dust(geometry, noise).to(incident.dtype)
-        plane, padded = noise.plane(geometry), self._padded()
-        turning = 1.0 if plane is None else 1 - noise.plane_distance
-        ends = [(0.0, 1.0)] if plane is None else [(0.0, turning), (turning, 1.0)]
-        legs = [profile.propagation.transfer(geometry, padded, profile.panel.pupil, leg) for leg in ends]
-        fy, fx = frequencies(padded, geometry.pitch)
-        for factor in present(stage.transmission(fy, fx, geometry) for stage in stages):
-            legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
-        path = quickest(
-            OpticalPath(
-                shape=geometry.shape,
-                rows=self.weights[0],
-                columns=self.weights[1],
-                transfer=by_columns(legs[0]),
-                dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
-                last=None if plane is None else by_columns(legs[1]),
-                finer=self.image_samples,
-            ),
-            self.device,
-        )
         power = profile.drift.laser_power(geometry) * profile.illumination.power * share
         return ChannelMaps(
             geometry=geometry,
@@ -149,7 +141,32 @@ class SimulatedBench:
                 incident=(math.sqrt(power) * incident).to(self.device, torch.complex64),
                 lut_bend=None if (bend := profile.lut.bend_map(geometry)) is None else bend.to(self.device),
             ),
-            path=path,
+            path=self._path(profile, geometry),
+        )
+
+    def _path(self, profile: Profile, geometry: Geometry) -> LightPath:
+        if geometry.image_pitch is not None:
+            return FourierPath.of(geometry, profile.propagation, self.image_samples).to(self.device)
+        noise = profile.coherent_noise
+        plane, padded = noise.plane(geometry), self._padded()
+        turning = 1.0 if plane is None else 1 - noise.plane_distance
+        ends = [(0.0, 1.0)] if plane is None else [(0.0, turning), (turning, 1.0)]
+        legs = [profile.propagation.transfer(geometry, padded, profile.panel.pupil, leg) for leg in ends]
+        rows, columns = sample_weights(padded, self.samples, geometry.blaze, hold=profile.aperture is not None)
+        fy, fx = frequencies(padded, geometry.pitch)
+        for factor in present(stage.transmission(fy, fx, geometry) for stage in profile.stages):
+            legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
+        return quickest(
+            OpticalPath(
+                shape=geometry.shape,
+                rows=rows,
+                columns=columns,
+                transfer=by_columns(legs[0]),
+                dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
+                last=None if plane is None else by_columns(legs[1]),
+                finer=self.image_samples,
+            ),
+            self.device,
         )
 
     def _padded(self) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from itertools import accumulate
@@ -115,6 +115,20 @@ class Profile:
         """Every effect, in the order in which light meets them; those that are switched off are left out."""
         return [effect for stage in self.stages for effect in stage.effects(self)]
 
+    def plane_faults(self) -> Iterator[tuple[tuple[str, str], str]]:
+        """Keys that have no meaning in a Fourier plane, and why."""
+        if self.panel.plane == "fresnel":
+            return
+        for where, given in (
+            (("propagation", "pupil_shift"), any(self.propagation.pupil_shift)),
+            (("propagation", "obstruction"), self.propagation.obstruction > 0),
+            (("coherent_noise", "plane_specks"), self.coherent_noise.plane_specks > 0),
+            (("lens", "move"), any(self.lens.move)),
+            (("eye", "focus"), any(self.eye.focus)),
+        ):
+            if given:
+                yield where, f"{'.'.join(where)} is for an image in a Fresnel plane; leave it out for plane: fourier"
+
     def scaled(self, shape: tuple[int, int] | None) -> Profile:
         """The profile on a smaller panel: the pitch stays, the distance scales with the rows.
 
@@ -199,6 +213,8 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     profile = typed(document, Profile, values)
     for key, fault in profile.panel.faults():
         raise document.error(("panel", key), fault)
+    for where, fault in profile.plane_faults():
+        raise document.error(where, fault)
     if fault := profile.panel.fault_of(profile.lut.table):
         raise document.error(("lut", "table"), fault)
     if profile.lut.bend and profile.lut.table:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ....core.units import Check, Metres
 from ....optics.phase import TAU, gray_level, wrap
-from ...api import DisplaySpec, Region
+from ...api import DisplaySpec, Plane, Region
 from ..stage import Effect, Stage
 from .spectrum import Width, gaussian_line
 
@@ -39,13 +39,16 @@ class Panel(Stage):
     """The nominal, public part of a profile.
 
     shape: rows and columns [px]; pitch: from pixel to pixel [m]; wavelengths: of red, green and blue, or a single one
-    [m]; distance: from the panel, or its image behind a relay, to the image plane [m], which shrinks with the rows on a
-    smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn [bits]; pupil: diameter of the iris
-    [share of the band 1 / pitch], null for none; blaze: carrier that the display adds and re-centres, vertical and
-    horizontal [cycles/px]; region: side of the scored window [share of the panel's]; levels: phase of each level by the
-    maker's table, which methods are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps; frames:
-    the most that the panel shows in one exposure of the camera [count]; linewidth: full width at half maximum of each
-    wavelength by the source's data sheet, which methods are told [m]; none for single lines.
+    [m]; distance: from the panel, or its image behind a relay, to the image plane, of a Fourier plane the focal length
+    [m], which shrinks with the rows on a smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn
+    [bits]; pupil: diameter of the iris [share of the band 1 / pitch], null for none; blaze: carrier that the display
+    adds and re-centres, vertical and horizontal [cycles/px]; region: side of the scored window [share of the panel's];
+    levels: phase of each level by the maker's table, which methods are told [percent of the largest,
+    ``(L - 1) / L 2 pi``]; none for equal steps; frames: the most that the panel shows in one exposure of the camera
+    [count]; linewidth: full width at half maximum of each wavelength by the source's data sheet, which methods are told
+    [m]; none for single lines; plane: fresnel for free space between panel and image, fourier for a lens that is its
+    focal length away from both; region_offset: of the scored window from the middle of the picture, which has the zero
+    order of a Fourier plane, down and right [share of the panel's sides].
     """
 
     title: ClassVar[str] = "panel"
@@ -62,12 +65,27 @@ class Panel(Stage):
     levels: Annotated[tuple[float, ...], Len(0, 1024)] = ()
     frames: Annotated[int, Interval(ge=1, le=256)] = 1
     linewidth: Annotated[tuple[Width, ...], Len(0, 3)] = ()
+    plane: Plane = "fresnel"
+    region_offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """Rows and columns that are scored."""
+        height, width = (max(1, round(self.region * size)) for size in self.shape)
+        return height, width
+
+    @property
+    def offset(self) -> tuple[int, int]:
+        """``region_offset``, down and right [px]."""
+        places = zip(self.region_offset, self.shape, self.window, strict=True)
+        down, right = (sorted((-((n - w) // 2), round(share * n), (n - w) // 2))[1] for share, n, w in places)
+        return down, right
 
     def spec(self, name: str) -> DisplaySpec:
         """The nominal optics of a display of that name."""
-        height, width = (max(1, round(self.region * size)) for size in self.shape)
         largest = TAU * (1 - 2.0**-self.bits)
         levels = tuple(value / 100 * largest for value in self.levels)
+        (height, width), (down, right) = self.window, self.offset
         return DisplaySpec(
             name=name,
             shape=self.shape,
@@ -76,20 +94,27 @@ class Panel(Stage):
             distance=self.distance,
             bits=self.bits,
             pupil=self.pupil,
-            region=Region((self.shape[0] - height) // 2, (self.shape[1] - width) // 2, height, width),
+            region=Region((self.shape[0] - height) // 2 + down, (self.shape[1] - width) // 2 + right, height, width),
             blaze=self.blaze,
             levels=(levels,) * len(self.wavelengths) if levels else (),
             frames=self.frames,
             spectrum=tuple(tuple(gaussian_line(width, TOLD_LINES)) for width in self.linewidth),
+            plane=self.plane,
         )
 
     def faults(self) -> Iterator[tuple[str, str]]:
-        """What does not go together: key and fault."""
+        """Keys whose values do not go together, and why."""
         if fault := self.fault_of(self.levels):
             yield "levels", fault
         widths, colours = len(self.linewidth), len(self.wavelengths)
         if widths not in (0, colours):
             yield "linewidth", f"there are {widths} widths; the panel has {colours} wavelengths"
+        if max(map(abs, self.region_offset)) > (1 - self.region) / 2:
+            yield "region_offset", f"the region is beyond the picture; up to {(1 - self.region) / 2:.4g} to each side"
+        if self.plane == "fourier" and self.pupil is not None:
+            yield "pupil", "the panel itself is the pupil of a Fourier plane; leave it out"
+        if self.plane == "fourier" and any(self.blaze):
+            yield "blaze", "the picture of a Fourier plane is placed beside the zero order by region_offset, not blaze"
 
     def fault_of(self, table: Sequence[float]) -> str:
         """What is wrong with the length of a table of the panel's levels; empty for none, and for no table."""

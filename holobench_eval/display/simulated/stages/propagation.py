@@ -27,7 +27,8 @@ class Propagation(Stage):
     """What separates the light's way from the nominal one.
 
     distance_error, wavelength_error: of the true one from the nominal one [relative]; aberration: over the iris (or
-    over the band when there is none), by Zernike name, such as ``defocus`` or ``coma_x`` [rms waves at 517 nm];
+    over the band when there is none; in a Fourier plane, over the panel), by Zernike name, such as ``defocus`` or
+    ``coma_x`` [rms waves at 517 nm];
     pupil_shift: of the iris, rows and columns [share of its radius]; obstruction: radius of an opaque disc in its
     middle [share of its radius].
     """
@@ -52,6 +53,26 @@ class Propagation(Stage):
         for name, waves in self.aberration.items():
             if waves:
                 yield Effect(name, f"aberration {name.replace('_', ' ')}, {waves:g} waves rms at 517 nm")
+
+    def panel(self, geometry: Geometry) -> Tensor | None:
+        """Phasor ``(H, W)`` of errors on the way to a Fourier plane, see ``lens_phase``; None in a Fresnel plane."""
+        if geometry.image_pitch is None:
+            return None
+        phase = self.lens_phase(geometry)
+        return torch.polar(torch.ones_like(phase), phase).to(torch.complex64)
+
+    def lens_phase(self, geometry: Geometry) -> Tensor:
+        """Defocus and aberration before a lens of focal length f, as a phase at the panel ``(H, W)`` [rad].
+
+        Light that leaves the panel at r from the axis arrives at the angle r / f, so that a camera at f (1 + e) sees
+        the paraxial phase -pi e r^2 / (lambda f) of the way f e (Goodman, Introduction to Fourier Optics, 5.2). The
+        panel is the pupil: its corners are the edge of the unit disc.
+        """
+        y, x = (axis * geometry.shape[0] for axis in geometry.coordinates())
+        wavelength, radius = geometry.wavelength * (1 + self.wavelength_error), math.hypot(*geometry.shape) / 2
+        defocus = -math.pi * self.distance_error * geometry.pitch**2 / (wavelength * geometry.distance)
+        aberration = wavefront(self.aberration, *torch.broadcast_tensors(y / radius, x / radius))
+        return defocus * (y * y + x * x) + aberration * (517e-9 / geometry.wavelength)
 
     def transfer(
         self, geometry: Geometry, padded: tuple[int, int], pupil: float | None, fraction: tuple[float, float]

@@ -77,8 +77,8 @@ class Sensor(Stage):
         return box_filter(light, samples * self.panel_pixels(profile))
 
     def panel_pixels(self, profile: Profile) -> float:
-        """Side of a sensor pixel in pixels of the panel."""
-        return self.pitch / (profile.relay.magnification * profile.panel.pitch)
+        """Side of a sensor pixel in pixels of the image."""
+        return self.pitch / (profile.relay.magnification * profile.spec().image_pitch)
 
     @property
     def white(self) -> float:
