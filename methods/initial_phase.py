@@ -52,8 +52,7 @@ def gathering_lens(spec: DisplaySpec, channel: int, like: Tensor) -> Tensor:
 
 def _aimed(spec: DisplaySpec, channel: int) -> Tensor:
     """Phase ``(H, W)`` [rad], float64, whose slope at each place of the panel is that place of the region, upright."""
-    step = spec.image_pitch * spec.pitch / (spec.wavelengths[channel] * spec.distance)  # cycles a pixel
-    region, axes = spec.region, []
+    region, step, axes = spec.region, spec.step(channel), []
     for size, first, window in zip(spec.shape, (region.top, region.left), region.shape, strict=True):
         x = torch.arange(size, dtype=torch.float64) - (size - 1) / 2
         middle = first + (window - 1) / 2 - size // 2

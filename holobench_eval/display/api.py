@@ -134,6 +134,10 @@ class DisplaySpec:
             return self.pitch
         return picture_pitch(self.shape, self.pitch, self.wavelengths, self.distance)
 
+    def step(self, channel: int) -> float:
+        """From pixel to pixel of the picture of a colour in a Fourier plane [cycles/px of the panel]."""
+        return self.image_pitch * self.pitch / (self.wavelengths[channel] * self.distance)
+
     def level_phases(self, channel: int) -> Tensor:
         """Nominal phase of every level of a colour, ``(2^bits,)`` [rad]. A display shows level ``g`` where it is given
         the phase ``2 pi g / 2^bits``, whatever phase the level has.

@@ -192,6 +192,10 @@ def _check_profiles(study: Study, document: Document) -> None:
             if (taken := REFERENCE if is_reference(display.name) else display.name) in seen:
                 both = f"'{profile}' and '{seen[taken]}' are both named '{display.name}'"
                 raise UserError(f"{both}; list each display once")
+            if learned:
+                refuse_plane(isolation.traits(learned.method, study.folder), learned.method, display.spec)
+        if study.measure == "focus" and display.spec.plane == "fourier":
+            raise document.error(("measure",), f"focal stacks need a Fresnel plane; '{profile}' has a Fourier plane")
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"

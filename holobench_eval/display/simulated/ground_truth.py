@@ -23,7 +23,7 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
     sensor's pixels.
     stray: share and reach of the stage.
     Zernikes: aberration, and errors of distance and wavelength, over the iris, and the second order of the beam's
-    phase as ``estimates.focusing`` has it.
+    phase as ``estimates.focusing`` has it; none where there is no iris, in a Fourier plane.
     """
     colours = range(len(bench.channels))
     return [item for colour in colours for item in (*_panel_truth(bench, colour), *_optics_truth(bench, colour))]
@@ -56,6 +56,8 @@ def _passed(bench: SimulatedBench) -> float:
 
 def _optics_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     panel, way, geometry = bench.profile.panel, bench.profile.propagation, bench.channels[colour].geometry
+    if panel.plane == "fourier":
+        return []
     edge = (panel.pupil or 1.0) / (2 * panel.pitch)
     fy, fx = (axis * edge for axis in disc())
     squared, wavelength, distance = fy**2 + fx**2, geometry.wavelength, geometry.distance

@@ -127,7 +127,7 @@ class Profile:
             (("eye", "focus"), any(self.eye.focus)),
         ):
             if given:
-                yield where, f"{'.'.join(where)} is for an image in a Fresnel plane; leave it out for plane: fourier"
+                yield where, f"{'.'.join(where)} is for an image in a Fresnel plane, and this one is in a Fourier plane"
 
     def scaled(self, shape: tuple[int, int] | None) -> Profile:
         """The profile on a smaller panel: the pitch stays, the distance scales with the rows.
@@ -164,9 +164,10 @@ class Profile:
         panel, full = self.scaled(shape).panel, self.panel
         if panel == full:
             return f"full panel of {full.shape[0]} x {full.shape[1]} pixels, {full.distance * 1e3:.4g} mm"
+        length = "distance" if panel.plane == "fresnel" else "focal length"
         return (
             f"{panel.shape[0]} x {panel.shape[1]} pixels of the full {full.shape[0]} x {full.shape[1]}: the pitch of "
-            f"{full.pitch * 1e6:.4g} um stays, the distance goes from {full.distance * 1e3:.4g} to "
+            f"{full.pitch * 1e6:.4g} um stays, the {length} goes from {full.distance * 1e3:.4g} to "
             f"{panel.distance * 1e3:.4g} mm, so that light spreads over the same fraction of the panel"
         )
 

@@ -15,7 +15,7 @@ import torch
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -212,20 +212,23 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     plane = profile.coherent_noise.plane(maps.geometry)
     clean = torch.ones(bench.spec.shape)
     _picture(axes[3], clean if plane is None else plane.real, "dust on the plane before the image", "amplitude")
-    f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
-    fy, fx = f[:, None], f[None, :]
-    wave = profile.propagation.pupil_phase(fy, fx, maps.geometry, profile.panel.pupil) / (2 * torch.pi)
-    inside = iris(fy, fx, bench.spec.pitch, profile.panel.pupil) > 0.5
-    _picture(
-        axes[4],
-        torch.where(inside, wave, torch.nan),
-        f"aberration in the iris{_named(bench)}",
-        "waves",
-        extent=(-0.5, 0.5, 0.5, -0.5),
-        axes=AT_IRIS,
-    )
+    _aberration(axes[4], bench)
     _veil(axes[5], bench)
     _picture(axes[6], bench.response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
+
+
+def _aberration(axis: Axes, bench: SimulatedBench) -> None:
+    """In the pupil: the iris, or before a lens the panel, where an error of the distance is seen too."""
+    profile, geometry = bench.profile, _middle(bench).geometry
+    if bench.spec.plane == "fourier":
+        wave = profile.propagation.lens_phase(geometry) / (2 * torch.pi)
+        return _picture(axis, wave, f"defocus and aberration at the panel{_named(bench)}", "waves")
+    f = torch.linspace(-0.5, 0.5, 201, dtype=torch.float64) / bench.spec.pitch
+    fy, fx = f[:, None], f[None, :]
+    wave = profile.propagation.pupil_phase(fy, fx, geometry, profile.panel.pupil) / (2 * torch.pi)
+    inside = iris(fy, fx, bench.spec.pitch, profile.panel.pupil) > 0.5
+    seen, title = torch.where(inside, wave, torch.nan), f"aberration in the iris{_named(bench)}"
+    return _picture(axis, seen, title, "waves", extent=(-0.5, 0.5, 0.5, -0.5), axes=AT_IRIS)
 
 
 def _spectrum(axis: Axes, bench: SimulatedBench) -> None:
@@ -279,7 +282,8 @@ def _chart(axes: list[Axes], workbench: CalibratedBench) -> None:
 
 
 def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
-    """The power of a hologram's light in the plane of the iris, with the iris and the place of the zero order.
+    """The power of a hologram's light in the plane of the iris, with the iris and the place of the zero order. In a
+    Fourier plane, that is the picture, with the region in the place of the iris.
 
     phase: ``(H, W)`` [rad]. The picture is centred, so that a blaze moves the zero order to its negative.
     """
@@ -291,6 +295,10 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
     _picture(axis, decibels, "", "power / its peak [dB]", "gray", (-0.5, 0.5, 0.5, -0.5), AT_IRIS)
     if profile.panel.pupil:
         axis.add_patch(Circle((0, 0), profile.panel.pupil / 2, fill=False, edgecolor="tab:orange"))
+    if bench.spec.plane == "fourier":
+        region, (rows, columns), step = bench.spec.region, bench.spec.shape, bench.spec.step(_index(bench))
+        corner = (step * (region.left - columns // 2), step * (region.top - rows // 2))
+        axis.add_patch(Rectangle(corner, step * region.width, step * region.height, fill=False, edgecolor="tab:orange"))
     share = float(bench.unmodulated.mean().abs() ** 2)
     up, across = (-cycles for cycles in profile.panel.blaze)
     if share < SMALLEST_SHARE:
@@ -298,6 +306,9 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
         return
     passed = float(iris(torch.tensor(up / pitch), torch.tensor(across / pitch), pitch, profile.panel.pupil)) > 0.5
     axis.plot(across, up, marker="o", markersize=14, markerfacecolor="none", markeredgecolor="tab:cyan")
+    if bench.spec.plane == "fourier":
+        axis.set_title(f"Fourier plane, zero order + dead area: {100 * share:.0f} %")
+        return
     axis.set_title(f"zero order + dead area: {100 * share:.0f} %, {'pass' if passed else 'stopped by'} the iris")
 
 

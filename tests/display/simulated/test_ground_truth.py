@@ -11,6 +11,7 @@ import torch
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.estimates import (
+    MODES,
     QUANTITIES,
     Estimate,
     disc,
@@ -38,11 +39,13 @@ def told(profile: Profile) -> dict[tuple[str, int | None], float]:
 
 @pytest.mark.parametrize("name", names())
 def test_every_display_tells_every_quantity_of_every_colour_once_and_in_its_unit(name: str) -> None:
-    found = truth(SimulatedBench(load_profile(name).scaled(SMALL)))
+    bench = SimulatedBench(load_profile(name).scaled(SMALL))
+    found, colours = truth(bench), range(len(bench.channels))
     keys = [(one.name, one.colour) for one in found]
     assert len(keys) == len(set(keys))
-    absent = {(quantity, colour) for quantity in ("undiffracted_phase", "stray_reach") for colour in range(3)}
-    assert set(keys) | absent == {(quantity, colour) for quantity in QUANTITIES for colour in range(3)}
+    without = ("undiffracted_phase", "stray_reach", *(MODES if bench.spec.plane == "fourier" else ()))
+    absent = {(quantity, colour) for quantity in without for colour in colours}
+    assert set(keys) | absent == {(quantity, colour) for quantity in QUANTITIES for colour in colours}
     assert all(one.unit == QUANTITIES[one.name].unit and math.isfinite(one.value) for one in found)
 
 

@@ -81,7 +81,8 @@ def test_light_is_neither_made_nor_lost(name, phase):
     """Mean light in the panel's shadow; an iris beside the zero order passes least, and some light spreads further."""
     off_axis = ("pluto-offaxis", "leto-2020", "leto-hazy", "leto-hazy-b", "leto-hazy-c")
     least = 0.75 if name in ("ideal", "plm-4bit") else 0.15 if name in off_axis else 0.4
-    assert least < float(SimulatedBench(load_profile(name).scaled(PANEL)).image(phase).mean()) < 1.02
+    bench = SimulatedBench(load_profile(name).scaled(PANEL))
+    assert least < float(bench.image(phase[: len(bench.channels)]).mean()) < 1.02
 
 
 def test_defocus_of_the_bench_is_that_of_the_nominal_model(with_stage, phase):

@@ -20,7 +20,9 @@ def test_scaling_keeps_pitch_and_relative_spread(rows, columns, name):
     relative = [spread(s.pitch, s.wavelengths[0], s.distance) / s.shape[0] for s in (full, small)]
     assert relative[0] == pytest.approx(relative[1])
     assert small.region.height <= rows
-    assert small.region.top * 2 + small.region.height in (rows, rows - 1)
+    assert small.region.top + small.region.height <= small.shape[0]
+    if name != "pluto-fourier":  # whose window lies beside the zero order
+        assert small.region.top * 2 + small.region.height in (rows, rows - 1)
 
 
 def test_no_panel_is_larger_than_the_display_and_scaling_is_said():

@@ -208,7 +208,13 @@ def checked(kind: str, value: Value) -> Value:
 
 
 def altered(profile: Profile, kind: str, value: Value) -> Profile:
-    """The profile, not scaled to a panel yet, after a change; the same object for a kind's nominal value."""
+    """The profile, not scaled to a panel yet, after a change; the same object for a kind's nominal value.
+
+    UserError for a change that has no meaning on the profile.
+    """
     if KINDS[kind].numeric and value == KINDS[kind].nominal:
         return profile
-    return KINDS[kind].apply(profile, value)
+    changed = KINDS[kind].apply(profile, value)
+    for _, fault in changed.plane_faults():
+        raise UserError(f"{kind} does not suit '{profile.name}': {fault}")
+    return changed
