@@ -94,7 +94,8 @@ class DisplaySpec:
     bits
         Of the panel.
     pupil
-        Diameter of the iris as a fraction of the panel's band 1 / pitch, None for no iris.
+        Diameter of the iris as a fraction of the panel's band 1 / pitch, None for no iris; for a Fourier plane, see
+        ``optics.fourier.picture_pitch``.
     region
         The scored window.
     eye
@@ -132,7 +133,7 @@ class DisplaySpec:
         """From pixel to pixel of the image [m]: that of the panel, or ``optics.fourier.picture_pitch``."""
         if self.plane == "fresnel":
             return self.pitch
-        return picture_pitch(self.shape, self.pitch, self.wavelengths, self.distance)
+        return picture_pitch(self.shape, self.pitch, self.wavelengths, self.distance, self.pupil or 1.0)
 
     def step(self, channel: int) -> float:
         """From pixel to pixel of the picture of a colour in a Fourier plane [cycles/px of the panel]."""

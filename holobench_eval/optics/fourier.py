@@ -11,18 +11,21 @@ from torch import Tensor
 from .angular_spectrum import check_geometry
 
 
-def picture_pitch(shape: tuple[int, int], pitch: float, wavelengths: Sequence[float], focal_length: float) -> float:
-    """Pitch [m] of the grid of a Fourier plane that all colours share: ``wavelength f / (N pitch)``.
+def picture_pitch(
+    shape: tuple[int, int], pitch: float, wavelengths: Sequence[float], focal_length: float, pupil: float = 1.0
+) -> float:
+    """Pitch [m] of the grid of a Fourier plane that all colours share: ``pupil wavelength f / (N pitch)``.
 
-    N: of the panel's longer side; wavelength: the shortest. So the longer side of the grid is one order of the shortest
-    wavelength, pixels are square, and no light is closer together than a pixel. Lengths in metres.
+    N: pixels of the panel's longer side; wavelength: the shortest; pupil: share of the grid's band that the panel
+    fills. At 1 the longer side of the grid is a diffraction order, and the field between two pixels is free; at 1/2 the
+    pixels hold all of the intensity, on half of that side. Lengths in metres.
 
     Examples
     --------
     >>> round(picture_pitch((1080, 1920), 8e-6, (532e-9,), 0.25) * 1e6, 2)
     8.66
     """
-    return min(wavelengths) * focal_length / (max(shape) * pitch)
+    return pupil * min(wavelengths) * focal_length / (max(shape) * pitch)
 
 
 def fourier_matrix(pixels: int, size: int, step: float, positions: Sequence[float] = (0.0,), finer: int = 1) -> Tensor:

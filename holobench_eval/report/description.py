@@ -140,6 +140,8 @@ def _gray(panel: Panel | DisplaySpec) -> str:
 def _optics(panel: Panel | DisplaySpec) -> str:
     wavelengths = ", ".join(f"{value * 1e9:.4g}" for value in panel.wavelengths)
     iris = f"an iris of {panel.pupil:g} of the band" if panel.pupil else "no iris"
+    if panel.plane == "fourier":
+        iris = f"image in the Fourier plane of a lens, {1 / (panel.pupil or 1):.3g} pixels to a resolved one"
     return f"optics: pitch {panel.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {panel.bits} bit, {iris}"
 
 

@@ -109,7 +109,7 @@ def test_the_camera_is_registered_beside_the_zero_order_and_sees_the_picture(sce
     target = display.target(scene(96)[0, 0].numpy())
     solved, wanted = display.solve("wirtinger", target, iterations=40), torch.tensor(np.asarray(target))
     seen, dark = (torch.tensor(np.asarray(display.capture(phase, target))) for phase in (solved, 0 * solved))
-    assert float((matched(seen, wanted) - wanted).square().mean()) < 0.3 * float(wanted.var())
+    assert float(torch.corrcoef(torch.stack([seen.flatten(), wanted.flatten()]))[0, 1]) > 0.75
     assert float(dark.mean()) < 0.01 * float(seen.mean())  # of a flat phase, all light is in the zero order
     with pytest.raises(UserError, match="'double_phase' needs the image in a Fresnel plane"):
         display.solve("double_phase", target)

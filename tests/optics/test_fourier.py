@@ -82,6 +82,20 @@ def test_sub_samples_of_equal_light_are_a_pixel():
     assert torch.allclose(whole @ field, (parts @ field.repeat(3))[::2])
 
 
+def test_pixels_of_half_the_pitch_hold_the_intensity_between_them():
+    assert picture_pitch((6, 8), 8e-6, (GREEN,), 0.2, 0.5) == 0.5 * picture_pitch((6, 8), 8e-6, (RED, GREEN), 0.2)
+
+    def intensity(size, finer):  # of points, whose picture repeats
+        cycles = (torch.arange(finer * size, dtype=torch.float64) / finer - size // 2) / size
+        return (fourier_matrix(8, size, 1 / size, finer=finer) @ random(8) / torch.sinc(cycles)).abs().square() * size
+
+    for size, is_held in ((8, False), (16, True)):
+        spectrum = torch.fft.fftshift(torch.fft.fft(intensity(size, 1)))
+        padded = torch.nn.functional.pad(spectrum, (size // 2, size // 2))
+        between = 2 * torch.fft.ifft(torch.fft.ifftshift(padded)).real
+        assert torch.allclose(between, intensity(size, 2)) == is_held
+
+
 def test_a_lens_without_a_focal_length_is_refused():
     with pytest.raises(ValueError, match="positive metres, got 0"):
         FourierLens(SHAPE, PITCH, GREEN, 0.0, 1e-6)

@@ -293,7 +293,7 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
     power = torch.fft.fftshift(torch.fft.fft2(field)).abs() ** 2
     decibels = 10 * torch.log10((power / power.max()).clamp(min=1e-5))
     _picture(axis, decibels, "", "power / its peak [dB]", "gray", (-0.5, 0.5, 0.5, -0.5), AT_IRIS)
-    if profile.panel.pupil:
+    if profile.panel.pupil and bench.spec.plane == "fresnel":
         axis.add_patch(Circle((0, 0), profile.panel.pupil / 2, fill=False, edgecolor="tab:orange"))
     if bench.spec.plane == "fourier":
         region, (rows, columns), step = bench.spec.region, bench.spec.shape, bench.spec.step(_index(bench))

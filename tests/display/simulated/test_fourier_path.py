@@ -112,7 +112,6 @@ def test_region_and_camera_lie_beside_the_zero_order():
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ("pupil: 0.8", "the panel itself is the pupil"),
         ("blaze: [0.0, 0.25]", "by region_offset, not blaze"),
         ("region_offset: [0.0, 0.4]", "up to 0.3125 to each side"),
     ],

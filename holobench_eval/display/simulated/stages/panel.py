@@ -41,14 +41,14 @@ class Panel(Stage):
     shape: rows and columns [px]; pitch: from pixel to pixel [m]; wavelengths: of red, green and blue, or a single one
     [m]; distance: from the panel, or its image behind a relay, to the image plane, of a Fourier plane the focal length
     [m], which shrinks with the rows on a smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn
-    [bits]; pupil: diameter of the iris [share of the band 1 / pitch], null for none; blaze: carrier that the display
-    adds and re-centres, vertical and horizontal [cycles/px]; region: side of the scored window [share of the panel's];
-    levels: phase of each level by the maker's table, which methods are told [percent of the largest,
-    ``(L - 1) / L 2 pi``]; none for equal steps; frames: the most that the panel shows in one exposure of the camera
-    [count]; linewidth: full width at half maximum of each wavelength by the source's data sheet, which methods are told
-    [m]; none for single lines; plane: fresnel for free space between panel and image, fourier for a lens that is its
-    focal length away from both; region_offset: of the scored window from the middle of the picture, which has the zero
-    order of a Fourier plane, down and right [share of the panel's sides].
+    [bits]; pupil: diameter of the iris, or the longer side of the panel for a Fourier plane [share of the image's band],
+    null for none; blaze: carrier that the display adds and re-centres, vertical and horizontal [cycles/px]; region:
+    side of the scored window [share of the panel's]; levels: phase of each level by the maker's table, which methods
+    are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps; frames: the most that the panel shows
+    in one exposure of the camera [count]; linewidth: full width at half maximum of each wavelength by the source's data
+    sheet, which methods are told [m]; none for single lines; plane: fresnel for free space between panel and image,
+    fourier for a lens that is its focal length away from both; region_offset: of the scored window from the middle of
+    the picture, which has the zero order of a Fourier plane, down and right [share of the panel's sides].
     """
 
     title: ClassVar[str] = "panel"
@@ -111,8 +111,6 @@ class Panel(Stage):
             yield "linewidth", f"there are {widths} widths; the panel has {colours} wavelengths"
         if max(map(abs, self.region_offset)) > (1 - self.region) / 2:
             yield "region_offset", f"the region is beyond the picture; up to {(1 - self.region) / 2:.4g} to each side"
-        if self.plane == "fourier" and self.pupil is not None:
-            yield "pupil", "the panel itself is the pupil of a Fourier plane; leave it out"
         if self.plane == "fourier" and any(self.blaze):
             yield "blaze", "the picture of a Fourier plane is placed beside the zero order by region_offset, not blaze"
 
