@@ -41,7 +41,7 @@ class Panel(Stage):
     shape: rows and columns [px]; pitch: from pixel to pixel [m]; wavelengths: of red, green and blue, or a single one
     [m]; distance: from the panel, or its image behind a relay, to the image plane, of a Fourier plane the focal length
     [m], which shrinks with the rows on a smaller panel; bits: gray levels are 2^bits, and 2^bits levels are a full turn
-    [bits]; pupil: diameter of the iris, or the longer side of the panel for a Fourier plane [share of the image's band],
+    [bits]; pupil: diameter of the iris, or longer side of the panel for a Fourier plane [share of the image's band],
     null for none; blaze: carrier that the display adds and re-centres, vertical and horizontal [cycles/px]; region:
     side of the scored window [share of the panel's]; levels: phase of each level by the maker's table, which methods
     are told [percent of the largest, ``(L - 1) / L 2 pi``]; none for equal steps; frames: the most that the panel shows
