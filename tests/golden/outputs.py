@@ -54,7 +54,7 @@ EXACT, ITERATED = 1e-4, 2e-3
 ROUNDED = {"hil": 5e-3, "hil_tuned": 5e-3, "odak_sgd": 5e-2}
 # A descent through a trained field model: between an Intel and an AMD processor its phases were 0.03 apart.
 ROUNDED |= {"field_network": 0.1}
-LARGER = {"leto-hazy-c": (160, 160)}  # panels of profiles whose camera is not registered at 128 px
+LARGER = {"leto-hazy-c": (160, 160), "pluto-fourier": (256, 256)}  # panels of profiles not registered at 128 px
 
 Numbers = dict[str, list[float]]
 
