@@ -128,7 +128,7 @@ class BandLimitedDoublePhase(DoublePhase):
         return _filtered(field, passed)
 
 
-def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
+def encode(field: Tensor, quantile: float = 1.0, largest: float = 1.0) -> Tensor:
     """Two phases ``phi +- arccos(a)`` in a checkerboard, whose mean is ``a exp(i phi)`` (Maimone et al. 2017).
 
     Parameters
@@ -137,6 +137,8 @@ def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
         ``(..., H, W)``, complex; a is its amplitude over its maximum in the panel.
     quantile : float
         Of the amplitude, in the place of its maximum.
+    largest : float
+        Amplitude a that larger ones are cut to; below 1 the gradient is finite.
 
     Returns
     -------
@@ -157,7 +159,7 @@ def encode(field: Tensor, quantile: float = 1.0) -> Tensor:
         flat = amplitude.flatten(-2).cpu()
         rank = max(1, round(quantile * flat.shape[-1]))
         white = flat.kthvalue(rank, dim=-1).values[..., None, None].to(field.device)
-    spread = torch.acos((amplitude / white.clamp_min(torch.finfo(white.dtype).tiny)).clamp(max=1))
+    spread = torch.acos((amplitude / white.clamp_min(torch.finfo(white.dtype).tiny)).clamp(max=largest))
     rows, columns = field.shape[-2:]
     parity = (
         torch.arange(rows, device=field.device)[:, None] + torch.arange(columns, device=field.device)[None, :]

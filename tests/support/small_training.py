@@ -69,6 +69,10 @@ QUICK: dict[str, dict[str, Any]] = {
         key: {"training": {"steps": 8}, "retrieval": {"iterations": 3}, "start": _EARLY}
         for key in ("image_terms", "image_network", "field_network")
     },
+    **{
+        key: {"steps": 3, "width": 4, "offset": "none"}
+        for key in ("holonet", "ccnn", "tensor_holography", "unet_phase")
+    },
 }
 
 

@@ -1,0 +1,1 @@
+"""Networks that give the phase of a hologram in one pass."""

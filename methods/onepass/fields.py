@@ -1,0 +1,30 @@
+"""What one-pass networks are made of: what they see of a colour, and the way from the image plane to the panel."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ...display.api import DisplaySpec
+from ..double_phase import encode
+
+LARGEST = 0.999  # amplitude that is encoded; the slope of the arc cosine is infinite at 1
+
+
+def coloured(images: Tensor) -> Tensor:
+    """Images ``(C, n, H, W)``, a row a colour, with a plane for each colour, one where it is that of the row and else
+    zero, ``(C, n + C, H, W)``."""
+    colours = len(images)
+    planes = torch.eye(colours, dtype=images.dtype, device=images.device)[:, :, None, None]
+    return torch.cat([images, planes.expand(colours, colours, *images.shape[-2:])], 1)
+
+
+def at_panel(field: Tensor, spec: DisplaySpec) -> Tensor:
+    """A field ``(C, H, W)`` at the image plane, brought back to the panel by the nominal optics."""
+    models = [spec.propagator(channel, device=field.device) for channel in range(len(field))]
+    return torch.stack([model.adjoint(plane) for model, plane in zip(models, field, strict=True)])
+
+
+def double_phase(field: Tensor) -> Tensor:
+    """Double phase encoding of a field ``(C, H, W)`` whose gradient is finite, to phase ``(C, H, W)`` [rad]."""
+    return encode(field, largest=LARGEST)
