@@ -11,12 +11,14 @@ from itertools import pairwise
 from typing import Annotated, ClassVar
 
 import torch
+from annotated_types import Interval
 from torch import Tensor, nn
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
 from ...optics.phasor import phasor
 from ..hil.generator import crop_to, pad_to_multiple
+from ..learned.samples import Steps
 from ..learned.weights import draw_weights
 from .fields import at_panel, coloured
 from .method import WIDTH, OnePass
@@ -88,6 +90,8 @@ class CCNN(OnePass):
         Features of the first level, doubled at every level; 4 in the publication.
     """
 
+    steps: Steps = 1500
+    rate: Annotated[float, Interval(gt=0, le=1)] = 5e-3
     width: Annotated[int, WIDTH] = 8
 
     title: ClassVar[str] = "complex-valued networks"

@@ -1,7 +1,7 @@
 """HoloNet: a network chooses the phase at the image plane, another one encodes the field at the panel.
 
 Peng, Choi, Padmanaban & Wetzstein, "Neural holography with camera-in-the-loop training", ACM Trans. Graph. 39(6), 185
-(2020), Section 5.
+(2020).
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class OnePass(ABC):
 
     through: Literal["ideal", "parametric_model"] = "ideal"
     steps: Steps = 1000
-    rate: Annotated[float, Interval(gt=0, le=1)] = 1e-3
+    rate: Annotated[float, Interval(gt=0, le=1)] = 2e-3
     seed: int = 0
     calibration: ParametricModel = ParametricModel()
     offset: Offset = "centre"

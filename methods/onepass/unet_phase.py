@@ -43,7 +43,7 @@ class UNetPhase(OnePass):
         Halvings of the resolution.
     """
 
-    rate: Annotated[float, Interval(gt=0, le=1)] = 5e-4
+    rate: Annotated[float, Interval(gt=0, le=1)] = 1e-3
     width: Annotated[int, WIDTH] = 8
     levels: Annotated[int, Interval(ge=1, le=8)] = 5
 

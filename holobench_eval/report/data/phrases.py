@@ -1,7 +1,7 @@
 """Rows and differences in words, with all that belongs to them.
 
-A row of a table is marked where its method is an oracle, fell back, or learned too little; a difference has its
-interval, sample and p value, and says whether it is shown.
+A row of a table is marked where its method is an oracle, fell back, learned too little or is dominated; a difference
+has its interval, sample and p value, and says whether it is shown.
 """
 
 from __future__ import annotations
@@ -67,6 +67,8 @@ def marks(results: Results, label: str, condition: str) -> Iterator[str]:
         yield f"stopped by the display on {ended} target{'s' * (ended > 1)}"
     if results.layout.measure == "prediction" and (below := _below(results, label, condition)):
         yield f"not trained to convergence: below {words(below)}"
+    if results.layout.measure == "picture" and (rival := _dominating(results, label, condition)):
+        yield f"dominated by {rival}"
 
 
 def _below(results: Results, label: str, condition: str) -> list[str]:
@@ -79,6 +81,23 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
         rows.insert(0, ("the constant image", CONSTANT, results.reference(condition)))
     ours, better = results.values(label, condition).mean(), results.headline.better
     return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]
+
+
+def _dominating(results: Results, label: str, condition: str) -> str:
+    """The best method without photographs that is as fast as a network without photographs, where the network is not
+    shown to be better; empty where there is none."""
+    if label not in results.layout.trained or not results.is_complete(label, condition):
+        return ""
+    rows = {name: results.row(name, condition) for name in results.ranking(condition)}
+    as_fast = (row.get("solving_s", np.nan) <= rows[label].get("solving_s", np.nan) for row in rows.values())
+    blind = [
+        name for name, is_fast in zip(rows, as_fast, strict=True) if is_fast and rows[name].get("total_captures") == 0
+    ]
+    if label not in blind or blind[0] == label:
+        return ""
+    gain = results.estimate(results.values(label, condition) - results.values(blind[0], condition))
+    least = gain.low if results.headline.sign > 0 else gain.high
+    return "" if results.headline.better(least, 0.0) else blind[0]
 
 
 def remarks(results: Results) -> list[str]:

@@ -62,3 +62,27 @@ def test_a_fallback_stands_in_the_row_and_survives_the_file_of_records() -> None
     again = Results(read_records(csv_text(found.frame)), found.layout)
     assert marked(again, "U-Net", DISPLAY) == "U-Net, fell back to Wirtinger"
     assert "fell_back" not in results(20.0, 19.0, 18.0).frame
+
+
+@pytest.mark.parametrize(
+    ("score", "seconds", "photographs", "mark"),
+    [
+        (30.0, 2.0, 0, ", dominated by Steps"),
+        (30.0, 0.5, 0, ""),  # nothing is as fast
+        (32.0, 2.0, 0, ""),  # nothing as fast is as good
+        (30.0, 2.0, 9, ""),  # nothing is known of the display without photographs
+    ],
+)
+def test_a_network_without_photographs_is_dominated_by_what_is_as_fast_and_not_worse(
+    score: float, seconds: float, photographs: int, mark: str
+) -> None:
+    rows = {"Network": (score, seconds), "Steps": (31.0, 1.0), "Many steps": (40.0, 9.0)}
+    learned = {"learned": {"sha256": "2" * 64, "captures": photographs, "seconds": 1.0}}
+    records = [
+        record(label, cell(label.lower(), target, DISPLAY), {"psnr_linear": value}, seconds=cost)
+        | (learned if label == "Network" else {})
+        for label, (value, cost) in rows.items()
+        for target in TARGETS
+    ]
+    found = of_records(records, trained=frozenset({"Network"}))
+    assert [marked(found, label, DISPLAY) for label in rows] == [f"Network{mark}", "Steps", "Many steps"]
