@@ -50,10 +50,10 @@ class HoloNetwork(nn.Module):
 class HoloNet(OnePass):
     """HoloNet (Peng et al. 2020), in a size for small panels and a CPU.
 
-    The paper's encoder gives the phase itself; here it corrects a double phase, and neither network changes anything
-    before it has learned: an untrained HoloNet is double phase. ``through: parametric_model`` trains it for a display
-    that was photographed, as the paper's camera-calibrated HoloNet. The other parameters are those of all one-pass
-    networks. SI units throughout.
+    The paper's encoder gives the phase itself; here it corrects a double phase, which an untrained HoloNet is. The way
+    back to the panel is that of the nominal optics also where ``through: parametric_model`` trains the networks for a
+    display that was photographed, in the paper that of its calibrated model. The other parameters are those of all
+    one-pass networks. SI units throughout.
 
     Parameters
     ----------

@@ -32,15 +32,15 @@ WIDTH = Interval(ge=1, le=256)
 class OnePass(ABC):
     """A network from the amplitude of a target to the phase of its hologram; a subclass gives the network. SI units.
 
-    It is trained with the harness's training images, without holograms to copy: its phase is shown by a model of the
-    display, and the loss is the squared error of the amplitude at the best brightness, ``losses.amplitude_l2``. One
-    network serves all colours of a display, and is told the colour.
+    It is trained without holograms to copy: a model of the display shows its phase of a training image, and the loss is
+    the squared error of the amplitude at the best brightness, ``losses.amplitude_l2``. One network serves all colours
+    of a display, and is told the colour.
 
     Parameters
     ----------
     through : {"ideal", "parametric_model"}
         What shows the phase in training. ideal: the nominal optics, without a photograph; parametric_model: the display
-        as that method learns it from photographs, then held. The network itself takes no photographs.
+        as that method learns it from photographs, then held.
     steps : int
         Of Adam, an image each.
     rate : float

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from annotated_types import Interval
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -20,16 +19,17 @@ from ..learned.weights import draw_weights, start_at_zero
 from .fields import at_panel, coloured, double_phase
 from .method import WIDTH, OnePass
 
+BLOCKS = 4  # pairs of convolutions; 14 in the publication
+
 
 class ResidualNetwork(nn.Module):
     """Convolutions of 3 x 3 px at full resolution in residual blocks of two, and what they make of an image encoded."""
 
-    def __init__(self, spec: DisplaySpec, width: int, blocks: int, sigma: float) -> None:
+    def __init__(self, spec: DisplaySpec, width: int) -> None:
         super().__init__()
-        self.spec, self.antialiased = spec, AntiAliasedDoublePhase(sigma=sigma)
+        self.spec, self.antialiased = spec, AntiAliasedDoublePhase()
         self.first = nn.Conv2d(1 + len(spec.wavelengths), width, 3, padding=1)
-        layers = (nn.Conv2d(width, width, 3, padding=1) for _ in range(2 * blocks))
-        self.blocks = nn.ModuleList(layers)
+        self.blocks = nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(2 * BLOCKS))
         self.last = nn.Conv2d(width, 2, 3, padding=1)
         start_at_zero(draw_weights(self, None))
 
@@ -47,27 +47,21 @@ class ResidualNetwork(nn.Module):
 class TensorHolography(OnePass):
     """Tensor holography (Shi et al. 2021) of flat pictures, in a size for small panels and a CPU.
 
-    The network of the publication takes an image with depth, learns from computed holograms and focal stacks, and
-    predicts the field in the middle of the scene. A flat picture has its middle at the image plane: what is predicted
-    there are a phase and a change of the target's amplitude, none before it has learned. An untrained one is
-    `double_phase_aa`. The other parameters are those of all one-pass networks. SI units throughout.
+    The published network takes an image with depth, learns from computed holograms and focal stacks, and predicts the
+    field in the middle of the scene. That of a flat picture is the image plane: predicted are a phase there and a
+    change of the target's amplitude. An untrained network is `double_phase_aa`. The other parameters are those of all
+    one-pass networks. SI units throughout.
 
     Parameters
     ----------
     width : int
         Features; 24 in the publication.
-    blocks : int
-        Pairs of convolutions; 14 in the publication.
-    sigma : float
-        Standard deviation of the Gaussian that the field is blurred by before it is encoded [px].
     """
 
     width: Annotated[int, WIDTH] = 12
-    blocks: Annotated[int, Interval(ge=1, le=100)] = 4
-    sigma: Annotated[float, Interval(gt=0, le=5)] = 0.5
 
     title: ClassVar[str] = "tensor holography"
 
     def network(self, spec: DisplaySpec) -> nn.Module:
         """See the base."""
-        return ResidualNetwork(spec, self.width, self.blocks, self.sigma)
+        return ResidualNetwork(spec, self.width)

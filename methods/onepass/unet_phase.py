@@ -14,13 +14,15 @@ from ..learned.weights import draw_weights
 from .fields import coloured
 from .method import WIDTH, OnePass
 
+LEVELS = 5  # halvings: a pixel sees most of a panel of 256 px, over which the optics spread its light
+
 
 class PhaseUNet(nn.Module):
     """The U-Net of Ronneberger et al. 2015, whose output is the phase."""
 
-    def __init__(self, spec: DisplaySpec, width: int, levels: int) -> None:
+    def __init__(self, spec: DisplaySpec, width: int) -> None:
         super().__init__()
-        self.layers = draw_weights(UNet(1 + len(spec.wavelengths), 1, levels, width), None)
+        self.layers = draw_weights(UNet(1 + len(spec.wavelengths), 1, LEVELS, width), None)
 
     def forward(self, amplitude: Tensor) -> Tensor:
         """Amplitude ``(C, H, W)`` to phase ``(C, H, W)`` [rad]."""
@@ -32,23 +34,19 @@ class PhaseUNet(nn.Module):
 class UNetPhase(OnePass):
     """A U-Net from the target's amplitude to the phase, without any propagation in it.
 
-    The naive row: what light spreads over the panel has to lie within what the network sees around a pixel. The other
-    parameters are those of all one-pass networks. SI units throughout.
+    The other parameters are those of all one-pass networks. SI units throughout.
 
     Parameters
     ----------
     width : int
         Features at full resolution, doubled at every level.
-    levels : int
-        Halvings of the resolution.
     """
 
     rate: Annotated[float, Interval(gt=0, le=1)] = 1e-3
     width: Annotated[int, WIDTH] = 8
-    levels: Annotated[int, Interval(ge=1, le=8)] = 5
 
     title: ClassVar[str] = "U-Net straight to phase"
 
     def network(self, spec: DisplaySpec) -> nn.Module:
         """See the base."""
-        return PhaseUNet(spec, self.width, self.levels)
+        return PhaseUNet(spec, self.width)
