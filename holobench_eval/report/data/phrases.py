@@ -86,18 +86,14 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
 def _dominating(results: Results, label: str, condition: str) -> str:
     """The best method without photographs that is as fast as a network without photographs, where the network is not
     shown to be better; empty where there is none."""
-    if label not in results.layout.trained or not results.is_complete(label, condition):
-        return ""
     rows = {name: results.row(name, condition) for name in results.ranking(condition)}
-    as_fast = (row.get("solving_s", np.nan) <= rows[label].get("solving_s", np.nan) for row in rows.values())
-    blind = [
-        name for name, is_fast in zip(rows, as_fast, strict=True) if is_fast and rows[name].get("total_captures") == 0
-    ]
-    if label not in blind or blind[0] == label:
+    blind = {name: row.get("solving_s", np.nan) for name, row in rows.items() if row.get("total_captures") == 0}
+    if label not in blind or label not in results.layout.trained:
         return ""
-    gain = results.estimate(results.values(label, condition) - results.values(blind[0], condition))
+    rival = next(name for name, seconds in blind.items() if name == label or seconds <= blind[label])
+    gain = results.estimate(results.values(label, condition) - results.values(rival, condition))
     least = gain.low if results.headline.sign > 0 else gain.high
-    return "" if results.headline.better(least, 0.0) else blind[0]
+    return "" if rival == label or results.headline.better(least, 0.0) else rival
 
 
 def remarks(results: Results) -> list[str]:
