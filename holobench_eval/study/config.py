@@ -207,8 +207,10 @@ def _check_profiles(study: Study, document: Document) -> None:
 
 
 def _condition(study: Study, source: str) -> Condition:
-    bench, panel = study.display.bench, study.display.panel
-    return real_condition(bench, study.folder) if bench else condition(source, panel, study.folder)
+    bench, learned = study.display.bench, study.display.learned
+    if bench:
+        return real_condition(bench, study.folder)
+    return condition(learned.profile if learned else source, study.display.panel, study.folder)
 
 
 def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[int, int]:
@@ -234,12 +236,13 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
             raise UserError(f"'{entry.name}' {what}; a study with 'isolation: none' runs it")
         if study.display.real and traits.privileged:
             raise UserError(f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one")
-        for source in entry.profiles or study.display.sources:
-            refuse_plane(traits, entry.name, _condition(study, source).spec)
     if entry.captures is not None and (not traits.camera or study.predicts):
         message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
         raise document.error((*where, "captures"), message)
     profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
+    with placed(document, (*where, "name"), (*where, "name")):
+        for source in profiles:
+            refuse_plane(traits, entry.name, _condition(study, source).spec)
     return replace(entry, params=isolation.params_of(method), profiles=profiles)
 
 

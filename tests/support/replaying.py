@@ -212,7 +212,7 @@ def fake_device(kind: str = "cpu", records: bool = True) -> Iterator[FakeCuda]:
     What a GPU cannot run, compiled code and OpenCV, is hidden: it would work on the memory unseen.
     """
     cuda = FakeCuda(records)
-    caches = angular_spectrum._band_limited_transfer, angular_spectrum._cut_off_transfer, api._propagator
+    caches = angular_spectrum._band_limited_transfer, angular_spectrum._cut_off_transfer, api._free_space
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(graphs, "RECORDERS", {kind: graphs.CudaGraph})
         for name in ("device", "current_stream", "stream", "graph", "get_sync_debug_mode", "set_sync_debug_mode"):
