@@ -26,8 +26,8 @@ from .settings import CaptureSettings
 class BenchFile:
     """A YAML file with these keys.
 
-    version: raised when anything on the bench is changed; panel: nominal optics, as in a profile; phase: what the
-    panel's levels mean; slm, camera: ``driver`` and its settings; capture: how photographs are taken; laser: how the
+    version: raised when anything on the bench is changed; panel: nominal optics, as in a profile, and the most frames
+    that panel and driver show in one exposure; phase: what the panel's levels mean; slm, camera: ``driver`` and its settings; capture: how photographs are taken; laser: how the
     laser is switched, for several wavelengths. The last four are for live use, and may be left out for an exchange of
     files. residual_bound: largest registration residual [region px, rms] with which a study may run.
     """
@@ -57,8 +57,6 @@ def load_bench_file(path: Path) -> BenchFile:
         raise document.error(("panel", "bits"), f"levels are written with 8 bits, got {bench.panel.bits}")
     for key, fault in bench.panel.faults():
         raise document.error(("panel", key), fault)
-    if bench.panel.frames != 1:
-        raise document.error(("panel", "frames"), "a bench that exists is photographed one frame at a time")
     told, capture = document.text, bench.capture
     if isinstance(capture.dark, str):
         file = path.parent / capture.dark

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,18 @@ class Slm(Protocol):
 
     def close(self) -> None:
         """Give the device back; more than once does nothing."""
+
+
+@runtime_checkable
+class SequenceSlm(Slm, Protocol):
+    """A panel that shows several patterns within one exposure: what ``panel.frames`` above 1 needs."""
+
+    def show_sequence(self, frames: Sequence[Levels]) -> None:
+        """Show ``(H, W)`` uint8 levels in turn, for equal times, again and again until the next call of ``show``.
+
+        Returns when the first has begun; DeviceError as ``show``. Every exposure holds whole turns: the driver
+        triggers the camera, or turns so fast that a part of one does not matter.
+        """
 
 
 class Camera(Protocol):

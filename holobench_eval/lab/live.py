@@ -10,7 +10,7 @@ from typing import Any
 from ..core.errors import UserError
 from ..methods.wirtinger import Wirtinger
 from .bench_file import BenchFile
-from .devices import Camera, DeviceError, Slm
+from .devices import Camera, DeviceError, SequenceSlm, Slm
 from .drivers.catalogue import checked_params, open_camera, open_slm
 from .drivers.worker import closed_on_failure
 from .laser import laser
@@ -57,6 +57,11 @@ def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
             if slm.shape != bench.panel.shape:
                 shape = list(bench.panel.shape)
                 raise UserError(f"panel.shape is {shape}, but {slm.name} has {list(slm.shape)} pixels")
+            if bench.panel.frames > 1 and not isinstance(slm, SequenceSlm):
+                raise UserError(
+                    f"panel.frames is {bench.panel.frames}, but driver '{panel[0]}' shows one pattern an exposure; leave "
+                    "it out, give the driver show_sequence, or exchange files (holoeval session)"
+                )
             return slm, open_camera(*camera)
     except DeviceError as error:
         raise UserError(f"bench '{bench.name}': {error}") from error

@@ -122,8 +122,9 @@ class RealBench(MethodHandles):
         return torch.stack([self.spec.region.crop(field.abs().square()).mean() for field in fields])
 
     def shown(self, phase: Tensor) -> Tensor:
-        """The phase that the panel gets: with the blaze of the bench."""
-        return phase.cpu() + blaze(self.spec.shape, self.carrier)
+        """The phase ``(C, H, W)`` or frames ``(F, C, H, W)`` [rad] that the panel gets: with the blaze of the bench."""
+        frames = phase[0] if phase.ndim == 4 and len(phase) == 1 else phase
+        return frames.cpu() + blaze(self.spec.shape, self.carrier)
 
     def relative_exposure(self, target: Tensor) -> float:
         """Exposure time for a target ``(C, h, w)``, relative to that for the fiducial grid, from the target alone."""
@@ -191,11 +192,11 @@ class RealSession:
     frames: int = field(default=0)
 
     def announce(self, phases: Sequence[Tensor]) -> None:
-        """Tell which phases ``(C, H, W)`` [rad] are captured next."""
+        """Tell which phases ``(C, H, W)`` or ``(F, C, H, W)`` [rad] are captured next."""
         self.bench.photographer.announce([self._request(phase, index) for index, phase in enumerate(phases)])
 
     def capture(self, phase: Tensor) -> Capture:
-        """Show ``phase`` ``(C, H, W)`` [rad] and photograph it. CellError for a saturated photograph."""
+        """Show ``phase`` ``(C, H, W)`` or ``(F, C, H, W)`` [rad] and photograph it. CellError where it saturates."""
         request = self._request(phase, 0)
         self.bench.photographer.announce([request])
         self.frames += 1

@@ -15,7 +15,7 @@ from torch import Tensor
 from ..core.errors import CellError, LostDeviceError, UserError
 from ..imaging.convention import Convention
 from .dark import Dark, given_dark
-from .devices import Camera, DeviceError, Slm
+from .devices import Camera, DeviceError, SequenceSlm, Slm
 from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
@@ -194,14 +194,19 @@ class Rig:
 
     def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
         self.laser.select(channel)
-        levels = convention.of(channel).levels(phase[channel])
+        levels = convention.of(channel).levels(phase[..., channel, :, :])
         self._fresh.changed((channel, levels.tobytes()))
-        self.slm.show(levels)
+        if phase.ndim == 3:
+            self.slm.show(levels)
+        elif isinstance(self.slm, SequenceSlm):
+            self.slm.show_sequence(list(levels))
+        else:
+            raise CellError(f"{self.slm.name} shows one pattern an exposure, not {len(phase)} frames")
         self.wait(settle)
 
     def _check_phase(self, phase: Tensor) -> None:
         wanted = (len(self.planes), *self.slm.shape)
-        if tuple(phase.shape) != wanted:
+        if phase.ndim not in (3, 4) or tuple(phase.shape[-3:]) != wanted:
             raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")
         if not phase.is_floating_point() or not bool(torch.isfinite(phase).all()):
             raise CellError("phase holds values that are no finite real numbers; the panel cannot show it")

@@ -8,7 +8,7 @@ from holobench_eval.lab.laser import SteadyLaser
 from holobench_eval.lab.photograph import Request, plane_of
 from holobench_eval.lab.rig import Rig
 from holobench_eval.lab.settings import CaptureSettings
-from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
+from tests.support.simulated_devices import GREEN, FastSlm, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
 FAST = CaptureSettings(average=1, dark_frames=2)
 
@@ -89,6 +89,21 @@ def test_photographs_are_light_per_second_of_the_channels_own_laser():
             assert np.corrcoef(seen.ravel(), expected.ravel())[0, 1] > 0.999
             assert abs(seen.mean() / expected.mean() - 1) < 0.02
             assert taken.exposure[channel] == pytest.approx(relative * bench_rig.prepared.exposures[channel])
+
+
+def test_frames_share_a_photograph_on_a_panel_that_shows_sequences_and_no_other_takes_them():
+    bench_rig = rig()
+    bench_rig.prepare(asked(), quiet)
+    phase = asked().phase
+    frames = torch.stack([phase, phase.roll(17, -1), -phase])
+    with pytest.raises(CellError, match="simulated panel shows one pattern an exposure, not 3 frames"):
+        bench_rig.photograph(asked(frames))
+    bench_rig.slm, before = FastSlm(bench_rig.scene), bench_rig.camera.frames
+    taken = bench_rig.photograph(asked(frames))
+    assert bench_rig.camera.frames == before + 1
+    expected = np.mean([truth(bench_rig, frame[0]) for frame in frames], axis=0) * bench_rig.camera.gain
+    assert np.corrcoef(taken.light[0].numpy().ravel(), expected.ravel())[0, 1] > 0.999
+    assert float(taken.light.mean()) == pytest.approx(expected.mean(), rel=0.02)
 
 
 def test_a_bracket_measures_a_picture_that_saturates_one_exposure():

@@ -57,7 +57,7 @@ class Lab:
         wavelengths = sorted({float(row["wavelength_nm"]) for row in rows}, reverse=True)
         for row in rows:
             channel = wavelengths.index(float(row["wavelength_nm"]))
-            levels = cv2.imread(str(folder / row["show"]), cv2.IMREAD_UNCHANGED)
+            levels = np.stack([cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED) for name in row["show"].split()])
             light = torch.zeros(self.bench.response.shape)
             if row["laser"] == "on":
                 light = self._light(self._phase(levels, convention), channel) * float(row["relative_exposure"])
@@ -74,15 +74,15 @@ class Lab:
 
     def _phase(self, levels: np.ndarray, convention: dict) -> torch.Tensor:
         if convention["flip_horizontal"]:
-            levels = levels[:, ::-1]
+            levels = levels[..., ::-1]
         if convention["flip_vertical"]:
-            levels = levels[::-1]
+            levels = levels[:, ::-1]
         turns = self.sign * convention["sign"] * levels.astype(np.float32) / convention["two_pi_level"]
         return torch.from_numpy((turns * math.tau + convention["origin"]).astype(np.float32))
 
-    def _light(self, phase: torch.Tensor, channel: int) -> torch.Tensor:
+    def _light(self, frames: torch.Tensor, channel: int) -> torch.Tensor:
         from holobench_eval.display.simulated.stages.relay import sample
 
         carrier = self.bench.ramp  # the patterns carry it already, this bench adds it itself
-        light = self.bench.integrated(phase - carrier, channel)
+        light = torch.stack([self.bench.integrated(phase - carrier, channel) for phase in frames]).mean(0)
         return sample(light, self.bench.grid, self.bench.image_samples)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -102,6 +102,8 @@ class Scene:
 
     def settled(self, levels: Levels) -> NDArray[np.float64]:
         assert self.channel is not None
+        if levels.ndim == 3:
+            return np.asarray(np.mean([self.settled(frame) for frame in levels], axis=0))
         key = (levels.tobytes(), self.channel)
         if key not in self.seen:
             picture = levels[:, ::-1] if self.flipped else levels
@@ -151,6 +153,15 @@ class SimulatedSlm:
 
     def close(self) -> None:
         pass
+
+
+class FastSlm(SimulatedSlm):
+    """A panel that turns through frames much faster than the camera exposes."""
+
+    def show_sequence(self, frames: Sequence[Levels]) -> None:
+        for frame in frames:
+            self.show(frame)
+        self.scene.history[-1] = (self.scene.clock.now, np.stack(frames))
 
 
 @dataclass

@@ -185,7 +185,7 @@ def check_swaps(
     own, least = rows @ columns.T, max(TOLD, SPREAD / rows.shape[1] ** 0.5)
     changed, alike = set[tuple[int, int]](), list[str]()
     for first, second in itertools.combinations(range(len(patterns)), 2):
-        if patterns[first].sha256 == patterns[second].sha256:
+        if _sums(patterns[first]) == _sums(patterns[second]):
             continue
         moved = own[first, first] + own[second, second] - own[first, second] - own[second, first]
         scale = np.linalg.norm(rows[first] - rows[second]) * np.linalg.norm(columns[first] - columns[second])
@@ -203,6 +203,10 @@ def check_swaps(
         elif (index, best) in changed and index < best:
             faults.append(f"wrong order: {here} and {there.capture}, of one target, changed places")
     return faults, alike
+
+
+def _sums(pattern: Pattern) -> list[str]:
+    return [frame.sha256 for frame in pattern.shown]
 
 
 def grain(picture: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -31,6 +31,7 @@ from .manifest import (
     PATTERNS,
     REPEAT,
     REVERSED,
+    FrameFile,
     Manifest,
     Pattern,
     capture_of,
@@ -74,7 +75,7 @@ class FolderPhotographer:
         """The photograph of a request. Pending where it has not been taken; CellError where it cannot be used."""
         self.announce([request])
         key = self._key(request)
-        patterns = [self._known.get((key, colour)) for colour in range(len(request.phase))]
+        patterns = [self._known.get((key, colour)) for colour in range(request.phase.shape[-3])]
         taken = [pattern for pattern in patterns if pattern is not None and pattern.round in self._series]
         if len(taken) < len(patterns):
             raise Pending("this hologram has not been photographed yet")
@@ -213,14 +214,18 @@ class FolderPhotographer:
     def _shown(
         self, role: str, levels: Levels | None, exposure: float, key: str, target: str, place: tuple[int, int]
     ) -> list[Pattern]:
-        """Write levels ``(C, H, W)``, or all zero, and describe them; place: round, and patterns before in it."""
+        """Write levels ``(C, H, W)``, or of frames ``(F, C, H, W)``, or all zero, and describe them; place: round, and
+        patterns before in it."""
         round_, before = place
         patterns = []
-        for colour in range(len(self.manifest.wavelengths)):
+        if levels is None:
+            levels = np.zeros((len(self.manifest.wavelengths), *self.manifest.panel), dtype=np.uint8)
+        frames = levels[None] if levels.ndim == 3 else levels
+        for colour, planes in enumerate(frames.swapaxes(0, 1)):
             number = before + colour + 1
-            plane = np.zeros(self.manifest.panel, dtype=np.uint8) if levels is None else levels[colour]
-            path = inside(self.folder, file_of(round_, number))
-            write_png(path, torch.from_numpy(plane[None]), bits=8)
+            first, *others = [
+                self._write(plane, file_of(round_, number, frame)) for frame, plane in enumerate(planes, 1)
+            ]
             patterns.append(
                 Pattern(
                     round=round_,
@@ -229,13 +234,19 @@ class FolderPhotographer:
                     colour=colour,
                     exposure=exposure,
                     key=key,
-                    sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-                    file=file_of(round_, number),
+                    sha256=first.sha256,
+                    file=first.file,
                     capture=capture_of(round_, number),
                     target=target,
+                    frames=tuple(others),
                 )
             )
         return patterns
+
+    def _write(self, plane: Levels, name: str) -> FrameFile:
+        path = inside(self.folder, name)
+        write_png(path, torch.from_numpy(plane[None]), bits=8)
+        return FrameFile(name, hashlib.sha256(path.read_bytes()).hexdigest())
 
     def write_checks(self, letter: Tensor) -> None:
         """Write the patterns that check the bench; letter: phase ``(C, H, W)`` [rad] of `preflight.phase_sign`."""
@@ -289,7 +300,7 @@ def _write_order(path: Path, patterns: Sequence[Pattern], wavelengths: Sequence[
     for pattern in patterns:
         wavelength, exposure = f"{wavelengths[pattern.colour] * 1e9:.1f}", f"{pattern.exposure:g}"
         laser = "blocked" if pattern.role == DARK else "on"
-        picture, photograph = pattern.file, f"{pattern.capture}.png"
+        picture, photograph = " ".join(each.file for each in pattern.shown), f"{pattern.capture}.png"
         writer.writerow([pattern.number, picture, photograph, pattern.role, wavelength, exposure, laser])
     write_atomically(path, text.getvalue().encode())
 
@@ -299,7 +310,8 @@ def _readme(number: int, patterns: int) -> str:
     return f"""Round {number}: {patterns} patterns.
 
 1. Show the pictures of {PATTERNS}/round-{number} in the order of order.csv, gray level for gray level, one panel pixel
-   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'.
+   a picture pixel. Light each with the laser of its wavelength; block the laser for role 'dark'. Where 'show' names
+   several, with spaces between, show them in turn for equal times within one exposure: they have one photograph.
 2. Photograph each after the panel has settled, with gamma, gain control, white balance and denoising off, and the
    session's own exposure time times relative_exposure. Choose that time once, so that no hologram saturates.
 3. Save each under the name in 'save_photograph_as' ({CAPTURES}/round-{number}/NNNN.png; 8- or 16-bit PNG or TIFF, or

@@ -35,15 +35,23 @@ Number = Annotated[int, Interval(ge=1, le=1_000_000)]
 
 
 @dataclass(frozen=True)
+class FrameFile:
+    """A further gray picture of an exposure: its file (see ``file_of``) and the sha256 of that."""
+
+    file: Annotated[str, MaxLen(100)]
+    sha256: Hex
+
+
+@dataclass(frozen=True)
 class Pattern:
-    """One gray picture for the panel.
+    """One gray picture for the panel, or several that share an exposure.
 
     round: from 1, `CHECKS` for the patterns that check the bench; number: its place in the order of its round, from 1;
     role: ``letter`` and ``reversed`` are the test pattern with the sign of the phase as stated and with the other one;
     colour: index of the wavelength it is lit with; exposure: exposure time relative to the session's own; key: tells
     what it is needed for; sha256: of the PNG file; file, capture: their names (see ``file_of`` and ``capture_of``),
     which are compared and not used; target: sha256 of the name of the target that it is scored against, empty where it
-    is not scored.
+    is not scored; frames: those after the first, where several share the exposure for equal times, in this order.
     """
 
     round: Annotated[int, Interval(ge=0, le=1_000_000)]
@@ -56,6 +64,12 @@ class Pattern:
     file: Annotated[str, MaxLen(100)]
     capture: Annotated[str, MaxLen(100)]
     target: Annotated[str, MaxLen(64)] = ""
+    frames: Annotated[tuple[FrameFile, ...], MaxLen(255)] = ()
+
+    @property
+    def shown(self) -> tuple[FrameFile, ...]:
+        """All pictures of the exposure, in the order of showing."""
+        return (FrameFile(self.file, self.sha256), *self.frames)
 
 
 @dataclass(frozen=True)
@@ -92,9 +106,10 @@ class Manifest:
         return [pattern for pattern in self.patterns if pattern.round == number]
 
 
-def file_of(round_: int, number: int) -> str:
-    """Where the PNG of a pattern is, in the session's folder."""
-    return f"{PATTERNS}/{_folder_of(round_)}/{number:04d}.png"
+def file_of(round_: int, number: int, frame: int = 1) -> str:
+    """Where the PNG of a pattern is, in the session's folder; frame: its number among those of an exposure, from 1."""
+    which = "" if frame == 1 else f"-frame-{frame}"
+    return f"{PATTERNS}/{_folder_of(round_)}/{number:04d}{which}.png"
 
 
 def capture_of(round_: int, number: int) -> str:
@@ -161,10 +176,8 @@ def _check_names(path: Path, patterns: Sequence[Pattern]) -> None:
         here = (pattern.round, pattern.number)
         if here not in ((last[0], last[1] + 1), (last[0] + 1, 1)):
             raise UserError(f"{path}: pattern {here[1]} of round {here[0]} stands after {last[1]} of round {last[0]}")
-        for what, name, right in (
-            ("file", pattern.file, file_of(*here)),
-            ("capture", pattern.capture, capture_of(*here)),
-        ):
+        files = [("file", each.file, file_of(*here, frame)) for frame, each in enumerate(pattern.shown, 1)]
+        for what, name, right in (*files, ("capture", pattern.capture, capture_of(*here))):
             if name != right:
                 raise UserError(f"{path}: {what} {name[:60]!r} should be {right!r}")
         last = here
