@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import torch
-from annotated_types import MinLen
+from annotated_types import Interval, MinLen
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -44,7 +44,8 @@ class Phases:
     row 0 is the top of the picture and column 0 its left, seen from where the camera stands. A blaze is added by the
     display itself. What a file holds becomes ``sign * value + origin`` in radians. Nothing is resampled.
 
-    An array is ``(H, W)``, ``(H, W, 3)`` or ``(3, H, W)``. Integers, and pictures, are levels; other real numbers are
+    An array is ``(H, W)``, ``(H, W, 3)`` or ``(3, H, W)``, or several of these, which are frames of one exposure.
+    Integers, and pictures, are levels; other real numbers are
     radians; complex numbers are the field at the panel, which ``encoder`` turns into a phase.
 
     Parameters
@@ -52,7 +53,7 @@ class Phases:
     file : str
         Path from the working directory: .png, .tif, .bmp, .npy, .npz or .mat. ``{target}`` in it stands for the name of
         the target, ``{stem}`` for that name up to its last dot (``cat`` for ``cat.jpg``), ``{channel}`` for the
-        colour, where each has a file of its own. Anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes
+        colour and ``{frame}`` for the number of the frame, where each has a file of its own. Anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes
         ``_``, and ``{target}`` then has a part of the name's hash behind; ``{stem}`` has it only for a name without a
         dot. Two targets with the same file are refused.
     amplitude : str
@@ -81,6 +82,8 @@ class Phases:
         The file is mirrored.
     order : {"rgb", "bgr"}
         Order of the colours in an array.
+    frames : int
+        Frames of a hologram, which share one exposure, where ``{frame}`` names their files: 1 and up.
     encoder : {"double_phase", "phase_only"}
         How a complex field becomes a phase: by double-phase encoding, or by its phase alone.
     """
@@ -98,6 +101,7 @@ class Phases:
     flip_vertical: bool = False
     order: Literal["rgb", "bgr"] = "rgb"
     encoder: Literal["double_phase", "phase_only"] = "double_phase"
+    frames: Annotated[int, Interval(ge=1, le=256)] = field(default=1, metadata=LATER)
 
     title: ClassVar[str] = "phases from files"
     version: ClassVar[int] = 2
@@ -107,9 +111,13 @@ class Phases:
 
     def __post_init__(self) -> None:
         for name, pattern in (("file", self.file), ("amplitude", self.amplitude)):
-            unknown = set(re.findall(r"\{[^}]*\}?", pattern)) - {"{target}", "{stem}", "{channel}"}
+            unknown = set(re.findall(r"\{[^}]*\}?", pattern)) - {"{target}", "{stem}", "{channel}", "{frame}"}
             if unknown:
-                raise UserError(f"{name}: '{min(unknown)}' stands for nothing; {{target}}, {{stem}} and {{channel}} do")
+                raise UserError(
+                    f"{name}: '{min(unknown)}' stands for nothing; {{target}}, {{stem}}, {{channel}} and {{frame}} do"
+                )
+            if self.frames > 1 and pattern and "{frame}" not in pattern:
+                raise UserError(f"frames: '{pattern}' is one file for all; name them by {{frame}}")
             if pattern and Path(pattern).suffix.lower() not in SUFFIXES:
                 raise UserError(f"{name}: '{pattern}' should end in {', '.join(SUFFIXES)}")
         if self.amplitude and ("{channel}" in self.amplitude) != ("{channel}" in self.file):
@@ -118,7 +126,8 @@ class Phases:
     def files(self, target_name: str) -> list[str]:
         """The files that hold the phase of a target; those of all colours where each has its own."""
         patterns = [pattern for pattern in (self.file, self.amplitude) if pattern]
-        paths = [path for pattern in patterns for path in self._paths(pattern, target_name)]
+        numbers = range(1, self.frames + 1)
+        paths = [path for each in patterns for number in numbers for path in self._paths(each, target_name, number)]
         return paths if self.correction is None else [*paths, self.correction.file]
 
     def refuse_shared(self, target_names: Iterable[str]) -> None:
@@ -150,26 +159,35 @@ class Phases:
         Tensor
             Phase ``(B, C, H, W)`` or frames ``(B, F, C, H, W)`` [rad], the same for every image of a batch.
         """
-        spec, colours = bench.spec, target.shape[1]
-        phase = self._read(self.file, bench.target_name, spec, colours)
+        frames = [
+            self._hologram(bench.target_name, bench.spec, target.shape[1], number + 1) for number in range(self.frames)
+        ]
+        phase = frames[0] if len(frames) == 1 else torch.stack(frames)
+        return phase.float().to(target.device).expand(len(target), *phase.shape).clone()
+
+    def _hologram(self, target_name: str, spec: DisplaySpec, colours: int, frame: int) -> Tensor:
+        """The phase [rad] in the file of a frame, or in the only one."""
+        phase = self._read(self.file, target_name, spec, colours, frame)
         if self.amplitude:
             if phase.is_complex():
                 raise CellError(f"{self.file}: a complex field needs no file of amplitudes")
-            modulus = self._read(self.amplitude, bench.target_name, spec, colours, phases=False)
+            modulus = self._read(self.amplitude, target_name, spec, colours, frame, phases=False)
             phase = torch.polar(modulus, phase.double())
         if phase.is_complex():
             phase = encode(phase) if self.encoder == "double_phase" else phase.angle()
-        return phase.float().to(target.device).expand(len(target), *phase.shape).clone()
+        return phase
 
-    def _paths(self, pattern: str, target_name: str) -> list[str]:
+    def _paths(self, pattern: str, target_name: str, frame: int = 1) -> list[str]:
         name = file_name(target_name)
-        path = pattern.replace("{target}", name).replace("{stem}", Path(name).stem)
+        path = pattern.replace("{target}", name).replace("{stem}", Path(name).stem).replace("{frame}", str(frame))
         return [path.replace("{channel}", name) for name in self.channels] if "{channel}" in path else [path]
 
-    def _read(self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, phases: bool = True) -> Tensor:
+    def _read(
+        self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, frame: int, phases: bool = True
+    ) -> Tensor:
         """What the files of a pattern hold, ``(C, H, W)`` or ``(F, C, H, W)``: phases [rad], complex fields, or
         amplitudes."""
-        paths = self._paths(pattern, target_name)
+        paths = self._paths(pattern, target_name, frame)
         if len(paths) > 1 and len(paths) != colours:
             raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
         if (missing := next((path for path in paths if not Path(path).is_file()), None)) is not None:

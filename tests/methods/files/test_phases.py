@@ -64,6 +64,18 @@ def test_frames_are_read_as_one_hologram(tmp_path: Path, last: bool) -> None:
     assert turns_apart(solved(tmp_path / "frames.npy"), frames) < 1e-6
 
 
+def test_frames_in_files_of_their_own_are_read_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    file = tmp_path / "{stem}-frame-{frame}.png"
+    for number, levels in enumerate((LEVELS, 255 - LEVELS), 1):
+        write_rgb(tmp_path / f"cat-frame-{number}.png", levels)
+    frames = np.stack([PHASE, (255 - LEVELS) * (math.tau / 256)])
+    assert turns_apart(solved(file, frames=2), frames) < 1e-6
+    with pytest.raises(CellError, match=r"cat-frame-3.png: no such file"):
+        solved(file, frames=3)
+    with pytest.raises(UserError, match=r"frames: '.*cat.png' is one file for all; name them by \{frame\}"):
+        solved(tmp_path / "cat.png", frames=2)
+
+
 @pytest.mark.parametrize("form", ["rgb.png", "rgb16.png", "rgb.tif", "npy", "last", "float", "npz", "mat", "channels"])
 def test_every_form_of_file_gives_the_phase_that_was_written(tmp_path: Path, form: str) -> None:
     file, params = tmp_path / form, {}
@@ -280,7 +292,7 @@ def test_a_reader_that_crashes_or_does_not_end_is_one_line(
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\} and \{channel\} do"),
+        ({"file": "{name}.npy"}, r"'\{name\}' stands for nothing; \{target\}, \{stem\}, \{channel\} and \{frame\} do"),
         ({"file": "phases/{target}.jpg"}, "should end in .png"),
         ({"file": "{target}.npy", "amplitude": "{channel}.npy"}, "in both patterns or in none"),
         ({"two_pi_level": 6.28}, r"'two_pi_level': 6.28 is no level of a full turn; expected 8 to .* \(of a panel"),
