@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from holobench_eval.report import layout_of, records_frame
+from holobench_eval.report.data import columns
 from holobench_eval.study.config import load_study
 from tests.study.test_run import compute
 
@@ -47,6 +48,7 @@ def test_frames_are_counted_kept_and_shown_together(tmp_path: Path) -> None:
     assert "m3: phase is (2, 3, 128, 127), the display shows (C, 128, 128)" in wrong["reason"]
     frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
     assert frame["frames"].tolist()[:2] == [1, 4]
+    assert frame["panel_time"].tolist()[:2] == [1, 4]
     saved = tmp_path / "out" / "phases"
     assert np.load(next((saved / "m0").rglob("*.npy"))).shape == (3, 128, 128)
     assert np.load(next((saved / "m1").rglob("*.npy"))).shape == (4, 3, 128, 128)
@@ -57,4 +59,13 @@ def test_frames_are_counted_kept_and_shown_together(tmp_path: Path) -> None:
 def test_a_study_of_single_frames_has_no_column_of_them(tmp_path: Path) -> None:
     (record,) = records = records_of(tmp_path, "ideal", "")
     assert record["state"] == "done"
-    assert "frames" not in records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    assert not {"frames", "panel_time"} & set(frame)
+
+
+def test_panel_time_counts_the_frames_of_every_capture() -> None:
+    column = next(each for each in columns.FIGURES if each.name == "panel_time")
+    assert column.unit == "frames"
+    assert column.source is not None
+    records = [{"frames": 8, "captures": 0}, {"frames": 8, "captures": 50}, {"captures": 50}, {"frames": 8}]
+    assert [column.source(record, None) for record in records] == [8, 408, 51, None]

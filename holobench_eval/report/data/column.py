@@ -45,12 +45,13 @@ def median(cells: Cells, name: str) -> float:
     return float(cells.done[name].median())
 
 
-def if_known(values: pd.Series, layout: Layout) -> bool:
+def if_known(frame: pd.DataFrame, name: str, layout: Layout) -> bool:
     """Whether any record has a value."""
+    values = frame[name]
     return bool((values.notna() & (values != "")).any())
 
 
-def if_trained(values: pd.Series, layout: Layout) -> bool:
+def if_trained(frame: pd.DataFrame, name: str, layout: Layout) -> bool:
     """Whether the study trains a method."""
     return bool(layout.trained)
 
@@ -71,7 +72,7 @@ class Column:
         Whether it follows from the config: its source is given the row so far in the place of the record, and gives it
         anew where records.csv is read.
     kept
-        Whether a frame has the column, from its values (None: always, and it has to be in a file that is read).
+        Whether a frame keeps the column, from all of its columns and the name (None: always, and it has to be in a file that is read).
     table
         Its value in table.csv, from the cells of a row and the column's name (None: not there).
     table_meaning
@@ -87,7 +88,7 @@ class Column:
     unit: str = ""
     source: Callable[..., Any] | None = None
     is_of_study: bool = False
-    kept: Callable[[pd.Series, Layout], bool] | None = None
+    kept: Callable[[pd.DataFrame, str, Layout], bool] | None = None
     table: Callable[[Cells, str], Any] | None = None
     table_meaning: str = ""
     heading: str = ""

@@ -224,14 +224,21 @@ def solving_s(record: Record, layout: Layout) -> float | None:
     return record.get("seconds")
 
 
-def _if_several(values: pd.Series, layout: Layout) -> bool:
-    return bool((values > 1).any())
+def _if_several(frame: pd.DataFrame, name: str, layout: Layout) -> bool:
+    return bool((frame["frames"] > 1).any())
 
 
 @column(FIGURES, "count", kept=_if_several, table=mean, heading="frames of a hologram")
 def frames(record: Record, layout: Layout) -> int:
-    """Frames of the hologram, which share one exposure: the panel's time for a picture, in frames."""
+    """Frames of the hologram, which share one exposure."""
     return int(record.get("frames", 1))
+
+
+@column(FIGURES, "count", unit="frames", kept=_if_several, table=mean, heading="panel time [frames]")
+def panel_time(record: Record, layout: Layout) -> int | None:
+    """Frames shown for the picture: those of the hologram, in each capture of solving and in the one that is scored."""
+    taken = record.get("captures")
+    return None if taken is None else int(record.get("frames", 1)) * (taken + 1)
 
 
 @column(FIGURES, "number")

@@ -69,7 +69,7 @@ def records_frame(records: Iterable[Record], layout: Layout) -> pd.DataFrame:
     kept = [
         column
         for column in listed
-        if column.name in frame and (column.kept is None or column.kept(frame[column.name], layout))
+        if column.name in frame and (column.kept is None or column.kept(frame, column.name, layout))
     ]
     first, last = ([column.name for column in part if column in kept] for part in (columns.CELL, columns.FIGURES))
     return _sorted(_whole(frame.reindex(columns=[*first, *scores, *last])), layout)
