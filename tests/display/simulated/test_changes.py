@@ -15,6 +15,7 @@ from holobench_eval.display.simulated.changes.kind import Kind, number
 from holobench_eval.display.simulated.changes.vision import EYEPIECE, Prescription
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import score
+from holobench_eval.optics.phase import blaze
 from holobench_eval.study.config import load_study
 from holobench_eval.study.opening import open_bench
 from holobench_eval.study.plan import plan
@@ -39,6 +40,7 @@ EXAMPLES = {
     "eye": "-2 / -1 x 30",
     "corrected_eye": "-2 / -1 x 30",
     "known_eye": "-2 / -1 x 30",
+    "eye_pupil": "0.5",
     "draw": "1",
 }
 
@@ -236,3 +238,17 @@ def test_an_unmoved_camera_keeps_its_registration():
     nominal = open_bench(profile, PANEL)
     blurred = open_bench(altered(profile, "defocus", 0.5), PANEL, 0, nominal)
     assert blurred.registration is nominal.registration
+
+
+def test_an_eye_sees_the_light_that_is_tilted_into_its_pupil():
+    profile = load_profile("ideal")  # an iris of 0.4 cycles a pixel
+    eye, camera = (open_bench(each, PANEL).bench for each in (altered(profile, "eye_pupil", "0.5"), profile))
+    tilted = [blaze(PANEL, (0.0, tilt)) for tilt in (0.0, 0.1, 0.2, 0.3, -0.2)]
+    seen = [float(eye.intensity(phase, 1).mean() / camera.intensity(phase, 1).mean()) for phase in tilted]
+    assert seen == pytest.approx([0.25, 1, 1, 1, 0], abs=0.03)  # at the soft edge half of the amplitude
+
+
+@pytest.mark.parametrize("place", ["left", "1.5", "nan"])
+def test_a_pupil_outside_the_iris_is_refused(place):
+    with pytest.raises(UserError, match=f"eye_pupil '{place}': expected places from '-1' to '1' radii of the iris"):
+        checked("eye_pupil", place)

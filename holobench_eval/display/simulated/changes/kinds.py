@@ -6,6 +6,7 @@ are marked "assumed" have no published source; lengths are those of the full pan
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,6 +19,8 @@ from .kind import Kind, Value, number, within
 
 USUAL_BITS = 8  # of the panels that a bit-depth sweep starts from
 GREEN = 517e-9  # wavelength [m] that a drift of the lasers is given at
+PUPIL = 0.5  # diameter of an eye's pupil, of the iris'; assumed
+PLACES = "places from '-1' to '1' radii of the iris"
 CLEARING, OPERATING, HALLER = 373.0, 308.0, 0.2
 """Of the liquid crystal: clearing point and panel temperature [K], assumed for a usual mixture, and the exponent of
 Haller's law, birefringence ~ (1 - T / T_clearing)^0.2 (Haller, Progress in Solid State Chemistry 10, 103, 1975)."""
@@ -88,6 +91,22 @@ def _eye(profile: Profile, value: Value) -> Profile:
 
 def _corrected_eye(profile: Profile, value: Value) -> Profile:
     return replace(_eye(profile, value), lens=AddedLens(vision.relative(profile, str(value))))
+
+
+def _eye_pupil(profile: Profile, value: Value) -> Profile:
+    band = profile.panel.pupil or 1.0
+    return replace(profile, eye=Eye(pupil=PUPIL * band, decentre=(0.0, float(value) * band)))
+
+
+def _place(text: str) -> str:
+    """A place of the pupil in one form. UserError for one where no pupil is."""
+    try:
+        place = float(text)
+    except ValueError:
+        place = math.nan
+    if not abs(place) <= 1:
+        raise UserError(f"eye_pupil '{text}': expected {PLACES}")
+    return f"{place:g}"
 
 
 def _known_eye(profile: Profile, value: Value) -> Profile:
@@ -180,6 +199,12 @@ KINDS: Mapping[str, Kind] = {
         "the same eye, known to the methods", "", ("eye",), _known_eye,
         "the eye is part of the nominal optics that holograms are computed for",
         nominal=None, read=vision.one_form, names=vision.NAMES,
+    ),
+    "eye_pupil": Kind(
+        "place of the eye's pupil, sideways from the axis, in radii of the iris", "", ("eye",), _eye_pupil,
+        f"a pupil of {PUPIL:g} of the iris' diameter (assumed) in an image of the iris, which is the eyebox; the "
+        "camera stays where it was registered",
+        nominal=None, read=_place, names=PLACES,
     ),
     "draw": Kind(
         "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import torch
+from annotated_types import Interval
 from torch import Tensor
 
+from ....optics.convolution import iris
 from ....optics.phase import Matrix, refocus
 from ..geometry import Geometry
 from ..stage import Stage
@@ -46,21 +48,26 @@ class AddedLens(Stage):
 
 @dataclass(frozen=True)
 class Eye(Stage):
-    """A relaxed eye that sees the plane at z (1 + ``focus``) instead of the image's.
+    """A relaxed eye that sees the plane at z (1 + ``focus``) instead of the image's, through its pupil.
 
     focus: along rows, along columns and cross term; astigmatism gives each meridian a distance of its own [relative to
-    the distance]. See ``changes.vision``. known: whether methods know the eye, as they know the nominal optics.
+    the distance]. See ``changes.vision``. pupil: diameter in the plane of the iris, as that of the iris
+    [share of the panel's band], none for one that takes in all light; decentre: of the pupil, rows and columns [share
+    of half the band]. known: whether methods know the focus, as they know the nominal optics.
     """
 
     title: ClassVar[str] = "eye"
     model: ClassVar[str] = "in the place of the camera: relaxed at another distance, meridian by meridian (paper 4.2)"
 
     focus: Matrix = (0.0, 0.0, 0.0)
+    pupil: Annotated[float, Interval(gt=0, le=1)] | None = None
+    decentre: tuple[float, float] = (0.0, 0.0)
     known: bool = False
 
     def transmission(self, fy: Tensor, fx: Tensor, geometry: Geometry) -> Tensor | None:
-        """See ``optics.phase.refocus``."""
-        if not any(self.focus):
+        """See ``optics.phase.refocus`` and ``optics.convolution.iris``."""
+        if not any(self.focus) and self.pupil is None:
             return None
         phase = refocus(self.focus, fy, fx, geometry.wavelength, geometry.distance)
-        return torch.polar(torch.ones_like(phase), phase)
+        down, right = (share / (2 * geometry.pitch) for share in self.decentre)
+        return torch.polar(iris(fy - down, fx - right, geometry.pitch, self.pupil), phase)
