@@ -41,6 +41,7 @@ REGISTRY = {
     "nearest_level": (NAVY, "^"),
     "straight_through": (SKY, "P"),
     "gumbel": (SKY, "*"),
+    "random_frames": (SKY, "p"),
     "partially_coherent": (SKY, "v"),
     "hil": (MAGENTA, "P"),
     "hil_tuned": (MAGENTA, "X"),

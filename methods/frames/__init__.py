@@ -1,0 +1,1 @@
+"""Holograms of several frames that share one exposure."""

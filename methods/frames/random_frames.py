@@ -1,0 +1,83 @@
+"""Frames of random phase, found one by one or together.
+
+Choi, Gopakumar, Peng, Kim, O'Toole & Wetzstein, "Time-multiplexed neural holography: a flexible framework for
+holographic near-eye displays with fast heavily-quantized spatial light modulators", ACM SIGGRAPH (2022); Lee, Kim, Lee,
+Chen & Lee, "High-contrast, speckle-free, true 3D holography via binary CGH optimization", Sci. Rep. 12, 2811 (2022).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ...optics.phase import TAU
+from ..common import Bench, nominal_model, per_channel, unit_field
+from ..descent import adam, by_autograd
+from ..losses import intensity_l2
+
+
+@dataclass(frozen=True)
+class RandomFrames:
+    """Adam on frames that start from random phases of their own, for the squared error of intensity in the region.
+
+    A random phase spreads the light of every point of the picture over the whole iris, so that an eye sees the picture
+    wherever its pupil is, at the price of speckle. Speckle of independent frames averages out as 1 / sqrt(N); frames
+    that are found together can take out each other's. The first frames of more start as fewer frames do. SI units
+    throughout.
+
+    Parameters
+    ----------
+    frames : int
+        Frames of a hologram, which share one exposure.
+    together : bool
+        The loss is that of the frames' mean intensity (true), or each frame has its own (false).
+    iterations : int
+        Evaluations of loss and gradient, of all frames.
+    step : float
+        Adam's step [rad].
+    """
+
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
+    together: bool = True
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
+
+    title: ClassVar[str] = "frames of random phase, Choi 2022"
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """The frames of the least loss that was seen (Choi et al. 2022, Lee et al. 2022).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Frames ``(B, F, C, H, W)`` [rad].
+        """
+        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
+
+    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """Frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
+        model, region = nominal_model(bench, channel, target), bench.spec.region
+        shared = self.frames if self.together else 1  # frames that a loss is of
+        wanted = target.repeat_interleave(self.frames // shared, dim=0)
+
+        def loss(phase: Tensor) -> Tensor:
+            light = region.crop(model.forward(unit_field(phase))).abs().square()
+            return intensity_l2(light.unflatten(0, (-1, shared)).mean(1), wanted).repeat_interleave(shared)
+
+        draw = bench.generator("random frames", channel)
+        start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
+        start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # (B F, H, W)
+        return adam(start, by_autograd(loss), self.iterations, self.step).unflatten(0, (-1, self.frames))
