@@ -76,4 +76,6 @@ def test_frames_are_refused_for_a_driver_without_sequences(table):
     (folder / "bench.yaml").write_text(simulated.BENCH.replace("bits: 8,", "bits: 8, frames: 2,"))
     done = run(folder)
     assert isinstance(done.exception, UserError)
-    assert "panel.frames is 2, but driver 'simulated' shows one pattern an exposure; leave it out, " in str(done.exception)
+    assert "panel.frames is 2, but driver 'simulated' shows one pattern an exposure; leave it out, " in str(
+        done.exception
+    )
