@@ -27,9 +27,10 @@ class BenchFile:
     """A YAML file with these keys.
 
     version: raised when anything on the bench is changed; panel: nominal optics, as in a profile, and the most frames
-    that panel and driver show in one exposure; phase: what the panel's levels mean; slm, camera: ``driver`` and its settings; capture: how photographs are taken; laser: how the
-    laser is switched, for several wavelengths. The last four are for live use, and may be left out for an exchange of
-    files. residual_bound: largest registration residual [region px, rms] with which a study may run.
+    that panel and driver show in one exposure; phase: what the panel's levels mean; slm, camera: ``driver`` and its
+    settings; capture: how photographs are taken; laser: how the laser is switched, for several wavelengths. The last
+    four are for live use, and may be left out for an exchange of files. residual_bound: largest registration residual
+    [region px, rms] with which a study may run.
     """
 
     name: Annotated[str, MinLen(1)]

@@ -59,8 +59,8 @@ def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
                 raise UserError(f"panel.shape is {shape}, but {slm.name} has {list(slm.shape)} pixels")
             if bench.panel.frames > 1 and not isinstance(slm, SequenceSlm):
                 raise UserError(
-                    f"panel.frames is {bench.panel.frames}, but driver '{panel[0]}' shows one pattern an exposure; leave "
-                    "it out, give the driver show_sequence, or exchange files (holoeval session)"
+                    f"panel.frames is {bench.panel.frames}, but driver '{panel[0]}' shows one pattern an exposure; "
+                    "leave it out, give the driver show_sequence, or exchange files (holoeval session)"
                 )
             return slm, open_camera(*camera)
     except DeviceError as error:

@@ -35,10 +35,10 @@ def plane_of(wavelength: float) -> int:
 class Request:
     """A hologram to be shown and photographed.
 
-    phase: ``(C, H, W)`` [rad], or frames ``(F, C, H, W)`` that share the exposure for equal times; relative_exposure: of the bench's own exposure time, for targets whose white pixels get
-    more or less light; role: what it is for, ``hologram`` or ``fiducial``; names: tell it from others with the same
-    phase, as they name the noise of a simulated bench; target: name of the target that it is scored against, empty for
-    a hologram that is not scored.
+    phase: ``(C, H, W)`` [rad], or frames ``(F, C, H, W)`` that share the exposure for equal times; relative_exposure:
+    of the bench's own exposure time, for targets whose white pixels get more or less light; role: what it is for,
+    ``hologram`` or ``fiducial``; names: tell it from others with the same phase, as they name the noise of a simulated
+    bench; target: name of the target that it is scored against, empty for a hologram that is not scored.
     """
 
     phase: Tensor

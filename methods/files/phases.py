@@ -52,10 +52,10 @@ class Phases:
     ----------
     file : str
         Path from the working directory: .png, .tif, .bmp, .npy, .npz or .mat. ``{target}`` in it stands for the name of
-        the target, ``{stem}`` for that name up to its last dot (``cat`` for ``cat.jpg``), ``{channel}`` for the
-        colour and ``{frame}`` for the number of the frame, where each has a file of its own. Anything but letters, digits, ``.``, ``-`` and ``_`` in a name becomes
-        ``_``, and ``{target}`` then has a part of the name's hash behind; ``{stem}`` has it only for a name without a
-        dot. Two targets with the same file are refused.
+        the target, ``{stem}`` for that name up to its last dot (``cat`` for ``cat.jpg``), ``{channel}`` for the colour
+        and ``{frame}`` for the number of the frame, where each has a file of its own. Anything but letters, digits,
+        ``.``, ``-`` and ``_`` in a name becomes ``_``, and ``{target}`` then has a part of the name's hash behind;
+        ``{stem}`` has it only for a name without a dot. Two targets with the same file are refused.
     amplitude : str
         Path of the amplitudes in the same manner, where amplitude and phase of a field lie in two files; empty for
         none.

@@ -72,7 +72,8 @@ class Column:
         Whether it follows from the config: its source is given the row so far in the place of the record, and gives it
         anew where records.csv is read.
     kept
-        Whether a frame keeps the column, from all of its columns and the name (None: always, and it has to be in a file that is read).
+        Whether a frame keeps the column, from all of its columns and the name (None: always, and it has to be in a file
+        that is read).
     table
         Its value in table.csv, from the cells of a row and the column's name (None: not there).
     table_meaning
