@@ -53,7 +53,7 @@ class PartiallyCoherent:
     initial_phase : str
         Where the descent starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
         lens that gathers the light of the panel in the region; dpe: the double phase hologram. The least populated
-        phase is moved to the wrap between 0 and 2 pi, across which the lines other than the nominal one see a step.
+        phase is moved to the wrap between 0 and 2 pi, across which the lines other than the nominal one take a step.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
