@@ -125,6 +125,7 @@ class Profile:
             (("coherent_noise", "plane_specks"), self.coherent_noise.plane_specks > 0),
             (("lens", "move"), any(self.lens.move)),
             (("eye", "focus"), any(self.eye.focus)),
+            (("eye", "pupil"), self.eye.pupil is not None),
         ):
             if given:
                 yield where, f"{'.'.join(where)} is for an image in a Fresnel plane, and this one is in a Fourier plane"
