@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...display.simulated.changes import KINDS
 from ...study.plan import is_reference
 from .categories import FLOOR
 from .column import DONE, Cells, Column, Record, column, first, if_known, if_trained, mean, median
@@ -122,8 +121,9 @@ def parameters(cells: Cells, name: str) -> str:
     return json.dumps(cells.layout.params.get(first(cells, "label"), {}), sort_keys=True, ensure_ascii=False)
 
 
-_KINDS = ", ".join(f"`{kind}`" for kind in KINDS)
-_SWEPT = f"What was changed after the display was calibrated, if anything: {_KINDS}; `plane` in focal stacks"
+_SWEPT = (
+    "What was changed after the display was calibrated, if anything, as the config names it; `plane` in focal stacks"
+)
 
 
 @column(CELL, is_of_study=True, table=_changed, meaning=_SWEPT)
