@@ -19,6 +19,11 @@ def coloured(images: Tensor) -> Tensor:
     return torch.cat([images, planes.expand(colours, colours, *images.shape[-2:])], 1)
 
 
+def bounded(phase: Tensor) -> Tensor:
+    """A phase [rad] that a network gives, brought smoothly into (-pi, pi), where the publications cut it."""
+    return torch.pi * torch.tanh(phase / torch.pi)
+
+
 def at_panel(field: Tensor, spec: DisplaySpec) -> Tensor:
     """A field ``(C, H, W)`` at the image plane, brought back to the panel by the nominal optics."""
     models = [spec.propagator(channel, device=field.device) for channel in range(len(field))]

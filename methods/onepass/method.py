@@ -51,7 +51,8 @@ class OnePass(ABC):
         How the display is learned, where ``through`` asks for it.
     offset : {"none", "centre"}
         Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
-        to the wrap between 0 and 2 pi, whose edges a panel blurs.
+        to the wrap between 0 and 2 pi, whose edges a panel blurs. A network trained through a display that was
+        photographed learns its own.
     """
 
     through: Literal["ideal", "parametric_model"] = "ideal"
@@ -125,7 +126,8 @@ class OnePass(ABC):
         with refuse_other_weights():
             network.load_state_dict(bench.learned["network"])
         with torch.no_grad():
-            return torch.stack([self._phase(network, bench.spec, image) for image in target])
+            phases = torch.stack([self._phase(network, bench.spec, image) for image in target])
+        return with_offset(phases, self.offset) if self.through == "ideal" else phases
 
     def _fresh(self, bench: TrainingBench | MeteredDisplay) -> nn.Module:
         with seeded("one-pass network", self.seed):
@@ -134,8 +136,7 @@ class OnePass(ABC):
     def _phase(self, network: nn.Module, spec: DisplaySpec, target: Tensor) -> Tensor:
         """Linear intensity ``(C, h, w)`` to phase ``(C, H, W)`` [rad]."""
         phase: Tensor = network(spec.region.embed(target.clamp_min(0).sqrt(), spec.shape))
-        bare = phase.detach()
-        return phase + (with_offset(bare, self.offset) - bare)  # the histogram behind the constant has no gradient
+        return phase
 
     def _show(self, bench: TrainingBench) -> Show:
         if self.through == "ideal":

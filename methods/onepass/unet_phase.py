@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from ...display.api import DisplaySpec
 from ..hil.baselines import UNet
 from ..learned.weights import draw_weights
-from .fields import coloured
+from .fields import bounded, coloured
 from .method import WIDTH, OnePass
 
 LEVELS = 5  # halvings: a pixel sees most of a panel of 256 px, over which the optics spread its light
@@ -26,8 +26,7 @@ class PhaseUNet(nn.Module):
 
     def forward(self, amplitude: Tensor) -> Tensor:
         """Amplitude ``(C, H, W)`` to phase ``(C, H, W)`` [rad]."""
-        phase: Tensor = self.layers(coloured(amplitude[:, None]))[:, 0]
-        return phase
+        return bounded(self.layers(coloured(amplitude[:, None]))[:, 0])
 
 
 @dataclass(frozen=True)

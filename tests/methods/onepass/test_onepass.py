@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 
 from holobench_eval.core import plugins
 from holobench_eval.display.api import DisplaySpec, ideal_image
@@ -78,6 +80,10 @@ def test_a_network_through_a_calibrated_model_costs_the_photographs_of_its_calib
     learned = calibrated.prepare(bench)
     assert bench.captures == alone.captures > 0
     assert not same(learned, ideal.prepare(bench_of(ODD, Memory())))
+    target = pictures(ODD)
+    trained, moved = (replace(calibrated, offset=offset) for offset in ("none", "centre"))
+    phases = [one.solve(target, solving_bench(one, target[0], ODD, learned)) for one in (trained, moved)]
+    assert torch.equal(*phases)  # the phase that the model of the display was shown
 
 
 def test_other_parameters_train_another_network(tmp_path: Path) -> None:
