@@ -59,7 +59,7 @@ def test_any_size_is_padded_and_comes_back(name: str) -> None:
 
 @networks
 def test_training_lowers_the_loss_without_a_photograph(name: str) -> None:
-    spec = small_spec()
+    spec = small_spec(48, 40)
     method = plugins.build("methods", name, {"steps": 60, "width": 4})
     bench = bench_of(spec, Memory(), images=1)
     learned = dict(method.prepare(bench))
