@@ -132,7 +132,7 @@ def save_levels(phase: Numbers, path: str | Path, **convention: Any) -> Path:
     if place.suffix.lower() != ".png":
         raise UserError(f"path: '{path}' should end in .png")
     if radians.ndim != 3 or len(radians) not in (1, 3) or 0 in radians.shape:
-        raise UserError(f"a phase of {tuple(radians.shape)}; expected (C, H, W) of 1 or 3 colours")
+        raise UserError(f"a phase of {tuple(radians.shape)}; expected (C, H, W) of 1 or 3 colours, of frames one each")
     given = {name: as_in_config(value) for name, value in convention.items()}
     try:
         check_radians(radians, "a ")

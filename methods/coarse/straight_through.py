@@ -23,7 +23,8 @@ from .levels import Levels
 class StraightThrough:
     """Adam on a phase whose nearest levels make the image, as if rounding had the slope of one.
 
-    The levels of the least loss that was seen are returned. SI units throughout.
+    The levels of the least loss that was seen are returned. On two levels it may end with a flat panel and no picture:
+    rounding has no slope there that leads anywhere. SI units throughout.
 
     Parameters
     ----------

@@ -112,8 +112,8 @@ def keys() -> set[str]:
 # What a reader of the field knows, or meets outside this package: abbreviations, names of networks, values of a key.
 KNOWN = """
 PSNR SSIM LPIPS MOFD FLIP LDR GMSD MDSI FSIM VSI SDSP HIL SLM BFGS RGB CPU GPU IEEE ACM CVPR GCPR ICIP CNN VGG DIV2K
- PNG TIFF EXIF MATLAB NTIRE Pix2Pix Pix2PixHD HoloNet HaarPSI ImageNet AlexNet CNNpropCNN PeerJ SHA256SUMS DIV2K_valid_HR
-AUTO ASM DIM ASM_FRESNEL DIM_FRESNEL SIGGRAPH CGH
+ PNG TIFF EXIF MATLAB NTIRE Pix2Pix Pix2PixHD HoloNet HaarPSI ImageNet AlexNet CNNpropCNN PeerJ SHA256SUMS
+DIV2K_valid_HR AUTO ASM DIM ASM_FRESNEL DIM_FRESNEL SIGGRAPH CGH
 """
 
 

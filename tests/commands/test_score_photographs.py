@@ -221,6 +221,9 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
     assert "--dark 4096" in text
     for said in run(tmp_path / "black", "linear", aligned=True, dark="4")[:2]:
         assert "of its white, although --dark took 4 counts off: bright/astronaut" in said
+    assert "Darker than" not in text + wrong[0]
+    for said in run(tmp_path / "black", "linear", aligned=True, dark="4800")[:2]:
+        assert "Darker than the target where it is darkest, by more than 5% of its white: dim/astronaut" in said
     with pytest.raises(UserError, match="not off encoded values; expected --values linear"):
         run(tmp_path / "black", "srgb", dark="4096")
 

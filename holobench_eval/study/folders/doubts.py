@@ -39,6 +39,14 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
             f"{shares}. Haze and stray light of the display do that; so does a camera's black level, which can turn "
             f"the order of methods.{remedy}"
         )
+    if dim := [
+        record for record in captures if record.values().get("darkest", 0.0) < -LIFTED and _has_dark(record, folders)
+    ]:
+        shares = named([f"{_name(record)} {-record.values()['darkest']:.0%}" for record in dim])
+        yield (
+            f"Darker than the target where it is darkest, by more than {LIFTED:.0%} of its white: {shares}. Dark "
+            "counts that are too high do that, and can turn the order of methods: look at a frame without light."
+        )
     if clipped := [record for record in captures if (record.saturated or 0) > MOST_SATURATED]:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
         yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
@@ -46,6 +54,10 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
+
+
+def _has_dark(record: Record, folders: Folders) -> bool:
+    return folders.captures[record.label, record.target].dark is not None
 
 
 def _remedy(record: Record) -> str:
