@@ -16,11 +16,12 @@ from ..imaging.register import Registration
 from ..optics import AngularSpectrum, FourierLens, Propagator
 from ..optics.convolution import frequencies
 from ..optics.fourier import picture_pitch
-from ..optics.phase import TAU, Matrix, refocus
+from ..optics.phase import TAU, Matrix, blaze, gray_level, refocus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
 Plane = Literal["fresnel", "fourier"]
+FINE = 8  # bits, whose rounding is left out of the nominal image
 DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite
 
 
@@ -377,7 +378,7 @@ class Display(Protocol):
 
 
 def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """The intensity that the nominal model makes of a phase.
+    """The intensity that the nominal model makes of a phase, of few levels or of a table by the nearest of them.
 
     Parameters
     ----------
@@ -400,9 +401,19 @@ def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
         return torch.stack([ideal_light(frame, spec) for frame in phase]).mean(0)
     fields = [
         spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
-        for channel, panel in enumerate(phase.float())
+        for channel, panel in enumerate(_through_table(phase.float(), spec))
     ]
     return torch.stack(fields).abs().square()
+
+
+def _through_table(phase: Tensor, spec: DisplaySpec) -> Tensor:
+    """Phase of the light where a panel of few levels is given a phase ``(C, H, W)`` [rad]; the gradient passes."""
+    if not spec.levels and spec.bits >= FINE:
+        return phase
+    ramp = blaze(spec.shape, spec.blaze).to(phase)
+    levels = gray_level(phase.detach() + ramp, spec.bits).long()
+    light = torch.stack([spec.level_phases(c).to(phase)[level] for c, level in enumerate(levels)]) - ramp
+    return phase + (light - phase.detach())
 
 
 Fiducials = Callable[[Display, Tensor], Mapping[tuple[int, int], Tensor]]

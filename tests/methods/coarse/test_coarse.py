@@ -11,14 +11,14 @@ import torch
 
 from holobench_eval.datasets.photographs import Photographs
 from holobench_eval.display import DisplaySpec, load_profile
-from holobench_eval.display.api import ideal_light
+from holobench_eval.display.api import ideal_image
 from holobench_eval.methods.coarse.gumbel import Gumbel, gumbel_noise
 from holobench_eval.methods.coarse.nearest_level import NearestLevel
 from holobench_eval.methods.coarse.straight_through import StraightThrough
 from holobench_eval.methods.common import matched
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics.psnr import psnr
-from holobench_eval.optics.phase import gray_level
+from holobench_eval.optics.phase import blaze, gray_level
 from tests.support.open_loop import Bench
 
 BINARY = replace(load_profile("ideal").spec((128, 128)), bits=1, wavelengths=(517e-9,))
@@ -29,9 +29,7 @@ TABULATED = replace(load_profile("plm-4bit").spec((128, 128)), wavelengths=(517e
 def quality(method: Any, spec: DisplaySpec) -> float:
     """PSNR [dB] of what a faultless panel with these levels makes of a photograph."""
     target = Photographs(names=("camera",)).load("camera", spec.region.shape)[1:2].float()
-    level = gray_level(method.solve(target[None], Bench(spec))[0], spec.bits).long()
-    shown = spec.level_phases(0)[level]  # (C, H, W), or frames of it
-    image = spec.region.crop(ideal_light(shown, spec))
+    image = ideal_image(method.solve(target[None], Bench(spec))[0], spec)
     return float(psnr(matched(image, target).clamp(0, 1), target))
 
 
@@ -46,6 +44,18 @@ def test_on_two_levels_annealing_gains_and_the_straight_through_gradient_does_no
     assert rounded == pytest.approx(quality(Wirtinger(), BINARY), abs=1e-4)  # the display rounds as well
     assert quality(Gumbel(), BINARY) > rounded + 4
     assert quality(StraightThrough(), BINARY) < rounded + 1
+
+
+@pytest.mark.parametrize("spec", [BINARY, TABULATED])
+def test_the_nominal_image_is_that_of_the_levels_and_lets_gradients_through(spec: DisplaySpec) -> None:
+    phase = 20 * torch.rand(1, *spec.shape, generator=torch.Generator().manual_seed(1)) - 10
+    shown = spec.level_phases(0)[gray_level(phase + blaze(spec.shape, spec.blaze), spec.bits).long()]
+    light = torch.polar(torch.ones_like(shown), shown - blaze(spec.shape, spec.blaze))
+    image = spec.region.crop(spec.propagator(0).forward(light)).abs().square()
+    asked = phase.requires_grad_()
+    assert torch.allclose(ideal_image(asked, spec), image, atol=1e-4)
+    (gradient,) = torch.autograd.grad(ideal_image(asked, spec).square().sum(), asked)
+    assert float(gradient.abs().max()) > 0
 
 
 def test_frames_that_are_found_together_gain_on_one_frame() -> None:
