@@ -214,13 +214,13 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
     assert lifted["dim"] < lifted["bright"]
     assert off["dim"] == pytest.approx(true["dim"], abs=0.1)
     assert off["bright"] == pytest.approx(true["bright"], abs=0.1)
-    assert "Bright where the target is darkest, by more than 5% of its white: bright/astronaut" in wrong[1]
+    assert "Bright where the target is darkest, by more than 5% of its white: dim/astronaut" in wrong[1]
     for said in wrong[:2]:
         assert "take it off with --dark" in said
     assert "Bright where" not in right[1] + terminal
     assert "--dark 4096" in text
     for said in run(tmp_path / "black", "linear", aligned=True, dark="4")[:2]:
-        assert "of its white, although --dark took 4 counts off: bright/astronaut" in said
+        assert "of its white, although --dark took 4 counts off: dim/astronaut" in said
     assert "Darker than" not in text + wrong[0]
     for said in run(tmp_path / "black", "linear", aligned=True, dark="4800")[:2]:
         assert "Darker than the target where it is darkest, by more than 5% of its white: dim/astronaut" in said

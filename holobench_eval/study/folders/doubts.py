@@ -31,6 +31,7 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
         yield f"Nearly the target itself, which a photograph with sensor noise is not: {named(near)}."
     yield from _mirrored(captures, folders)
     if bright := [record for record in captures if record.values().get("darkest", 0.0) > LIFTED]:
+        bright.sort(key=lambda record: -record.values()["darkest"])
         shares = named([f"{_name(record)} {record.values()['darkest']:.0%}" for record in bright])
         first = folders.captures[bright[0].label, bright[0].target]
         remedy = "" if first.dark else f" If the files still have one, {_remedy(bright[0])}."
