@@ -100,7 +100,7 @@ def checked(path: Path, linear: bool = False, dark: Dark | None = None) -> Pictu
         except UserError as error:
             raise UserError(f"{path}: {error}") from error
         if mean <= 0:
-            raise UserError(f"{path}: on average no brighter than the dark counts; expected a capture with the light on")
+            raise UserError(f"{path}: on average no brighter than the dark counts; expected one with the light on")
     gray = all(np.array_equal(plane, values[0]) for plane in values[1:])
     return Picture(
         path,
