@@ -63,12 +63,12 @@ class RandomFrames:
         Returns
         -------
         Tensor
-            Frames ``(B, F, C, H, W)`` [rad].
+            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
         """
         return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
 
     def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
-        """Frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
+        """Phase ``(B, H, W)`` or frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         shared = self.frames if self.together else 1  # frames that a loss is of
         wanted = target.repeat_interleave(self.frames // shared, dim=0)
@@ -80,4 +80,5 @@ class RandomFrames:
         draw = bench.generator("random frames", channel)
         start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
         start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # (B F, H, W)
-        return adam(start, by_autograd(loss), self.iterations, self.step).unflatten(0, (-1, self.frames))
+        frames = adam(start, by_autograd(loss), self.iterations, self.step)
+        return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
