@@ -21,7 +21,7 @@ from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
 Plane = Literal["fresnel", "fourier"]
-FINE = 8  # bits, whose rounding is left out of the nominal image
+FINE = 8  # bits, whose rounding hardly shows
 DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite
 
 
@@ -378,7 +378,7 @@ class Display(Protocol):
 
 
 def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """The intensity that the nominal model makes of a phase, of few levels or of a table by the nearest of them.
+    """The intensity that the nominal model makes of a phase, see also ``nominal_levels``.
 
     Parameters
     ----------
@@ -401,18 +401,19 @@ def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
         return torch.stack([ideal_light(frame, spec) for frame in phase]).mean(0)
     fields = [
         spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
-        for channel, panel in enumerate(_through_table(phase.float(), spec))
+        for channel, panel in enumerate(phase.float())
     ]
     return torch.stack(fields).abs().square()
 
 
-def _through_table(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """Phase of the light where a panel of few levels is given a phase ``(C, H, W)`` [rad]; the gradient passes."""
+def nominal_levels(phase: Tensor, spec: DisplaySpec) -> Tensor:
+    """Nominal phase of the light where a panel is given a phase ``(..., C, H, W)`` [rad]: by the maker's table or, of
+    fewer than 8 bits, by equal steps; of more, the phase itself. The gradient is that of the phase."""
     if not spec.levels and spec.bits >= FINE:
         return phase
     ramp = blaze(spec.shape, spec.blaze).to(phase)
-    levels = gray_level(phase.detach() + ramp, spec.bits).long()
-    light = torch.stack([spec.level_phases(c).to(phase)[level] for c, level in enumerate(levels)]) - ramp
+    colours = gray_level(phase.detach() + ramp, spec.bits).long().unbind(-3)
+    light = torch.stack([spec.level_phases(c).to(phase)[level] for c, level in enumerate(colours)], dim=-3) - ramp
     return phase + (light - phase.detach())
 
 

@@ -10,7 +10,7 @@ from torch.nn.functional import avg_pool2d
 
 from ..core.errors import CellError
 from ..optics.phase import FARTHEST, are_levels, farthest
-from .api import DisplaySpec, ideal_light, is_plain, type_name
+from .api import DisplaySpec, ideal_light, is_plain, nominal_levels, type_name
 
 # Correlations of an image with its target. On photographs, phases of the methods here have 0.97 and more; those that
 # were found with captures and make up for faults of a display have 0.82 and more, and 0.49 on leto-aged. No other pose,
@@ -132,7 +132,7 @@ def unit_doubt(phase: Tensor) -> str:
 def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:
     """The correlation of amplitudes of image and target, mean over colours, by the pose of the file; empty where the
     target is even, or nearly so, in all colours."""
-    image = ideal_light(phase, spec)
+    image = ideal_light(nominal_levels(phase, spec), spec)
     poses = {name: image.flip(axes) for name, axes in MIRRORED.items()}
     if spec.shape[0] == spec.shape[1]:
         poses |= {f"transposed, {name}".removesuffix(", "): pose.mT for name, pose in poses.items()}

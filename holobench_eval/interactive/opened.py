@@ -19,7 +19,7 @@ from ..core.panels import is_small, rows_and_columns
 from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
-from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, type_name
+from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, nominal_levels, type_name
 from ..display.phases import check_phase, phase_doubt, single
 from ..display.traits import refuse_plane, traits_of
 from ..study import opening
@@ -153,7 +153,8 @@ class OpenDisplay:
         return described(taken.image.cpu().numpy(), CAPTURE)
 
     def ideal(self, phase: Numbers) -> Array:
-        """What the nominal model, without any fault, makes of a phase ``(C, H, W)`` [rad].
+        """What the nominal model, without any fault, makes of a phase ``(C, H, W)`` [rad]; of a panel with a table, or
+        fewer than 8 bits, of its levels.
 
         Returns
         -------
@@ -165,7 +166,8 @@ class OpenDisplay:
         UserError
             The display shows no such phase.
         """
-        return described(ideal_image(self._phase(phase), self.spec).cpu().numpy(), IDEAL)
+        shown = nominal_levels(self._phase(phase), self.spec)
+        return described(ideal_image(shown, self.spec).cpu().numpy(), IDEAL)
 
     @contextmanager
     def _threads(self) -> Iterator[None]:

@@ -13,7 +13,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec, ideal_image
+from ...display.api import DisplaySpec, ideal_image, nominal_levels
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
 from ..calibrated.approximator import PredictedCapture
@@ -140,7 +140,7 @@ class OnePass(ABC):
 
     def _show(self, bench: TrainingBench) -> Show:
         if self.through == "ideal":
-            return lambda phase, light: ideal_image(phase, bench.spec)
+            return lambda phase, light: ideal_image(nominal_levels(phase, bench.spec), bench.spec)
         display = self.calibration.approximator(bench.spec).to(bench.device)
         display.load_learned(self.calibration.prepare(bench))
         return PredictedCapture(display.model, display.network, display.terms).requires_grad_(False)
