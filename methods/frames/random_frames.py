@@ -77,8 +77,13 @@ class RandomFrames:
             light = region.crop(model.forward(unit_field(phase))).abs().square()
             return intensity_l2(light.unflatten(0, (-1, shared)).mean(1), wanted).repeat_interleave(shared)
 
-        draw = bench.generator("random frames", channel)
-        start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
-        start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # (B F, H, W)
+        start = random_start(self.frames, target, bench, channel)
         frames = adam(start, by_autograd(loss), self.iterations, self.step)
         return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
+
+
+def random_start(frames: int, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    """Phases ``(B F, H, W)``, uniform over 2 pi [rad], for targets ``(B, h, w)``: the same for all of a batch."""
+    draw = bench.generator("random frames", channel)
+    start = TAU * torch.rand((frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
+    return start.to(target.device, target.dtype).repeat(len(target), 1, 1)

@@ -45,7 +45,10 @@ QUICK: dict[str, dict[str, Any]] = {
     "wirtinger_gamma": {"images": 1, "of": _EARLY},
     "wirtinger_veil": {"iterations": 6},
     "nearest_level": {"start": _EARLY},
-    **{key: {"iterations": 6} for key in ("straight_through", "gumbel", "partially_coherent", "random_frames")},
+    **{
+        key: {"iterations": 6}
+        for key in ("straight_through", "gumbel", "partially_coherent", "random_frames", "light_field")
+    },
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding
     "online_camera": {"captures": 24, "start": _START},

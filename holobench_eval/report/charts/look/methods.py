@@ -42,6 +42,7 @@ REGISTRY = {
     "straight_through": (SKY, "P"),
     "gumbel": (SKY, "*"),
     "random_frames": (SKY, "p"),
+    "light_field": (SKY, "X"),
     "partially_coherent": (SKY, "v"),
     "hil": (MAGENTA, "P"),
     "hil_tuned": (MAGENTA, "X"),

@@ -1,0 +1,102 @@
+"""Frames of random phase that are supervised by what an eye sees from several places of its pupil.
+
+Choi, Gopakumar, Peng, Kim, O'Toole & Wetzstein, "Time-multiplexed neural holography: a flexible framework for
+holographic near-eye displays with fast heavily-quantized spatial light modulators", ACM SIGGRAPH (2022), whose light
+fields these are; Chakravarthula, Baek, Schiffers, Tseng, Kuo, Maimone, Matsuda, Cossairt, Lanman & Heide, "Pupil-aware
+holography", ACM Trans. Graph. 41(6), 212 (2022); Kim, Nam, Lee, Lee & Lee, "Holographic parallax improves 3D perceptual
+realism", ACM Trans. Graph. 43(4), 68 (2024).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import torch
+from annotated_types import Interval
+from torch import Tensor
+
+from ...display.api import DisplaySpec
+from ...optics.convolution import frequencies, iris
+from ..common import Bench, nominal_model, per_channel, unit_field
+from ..descent import adam, by_autograd
+from ..losses import intensity_l2
+from .random_frames import random_start
+
+
+@dataclass(frozen=True)
+class LightField:
+    """Adam on frames that start from random phases, for the squared error of the light field of a flat picture.
+
+    The light field is what an eye sees whose pupil is in the middle of the iris, or on one of the rings around it:
+    every view is the picture, and all views have one brightness. SI units throughout.
+
+    Parameters
+    ----------
+    frames : int
+        Frames of a hologram, which share one exposure.
+    rings : int
+        Rings of places, evenly up to half of the iris' radius; the k-th has 6 k places. Between places that are far
+        apart no loss holds the picture.
+    pupil : float
+        Diameter of the eye's pupil, as a share of the iris'.
+    iterations : int
+        Evaluations of loss and gradient, of all frames and views.
+    step : float
+        Adam's step [rad].
+    """
+
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
+    rings: Annotated[int, Interval(ge=0, le=8)] = 2
+    pupil: Annotated[float, Interval(gt=0, le=1)] = 0.5
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
+
+    title: ClassVar[str] = "frames of random phase for a light field, Choi 2022"
+    camera: ClassVar[bool] = False
+    privileged: ClassVar[bool] = False
+    fresnel: ClassVar[bool] = True
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """The frames of the least loss that was seen (Choi et al. 2022, the loss of light fields).
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
+        """
+        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
+
+    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """Phase ``(B, H, W)`` or frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
+        model, region = nominal_model(bench, channel, target), bench.spec.region
+        pupils = self._pupils(bench.spec).to(target.device, target.dtype)
+        wanted = target.repeat(1, len(pupils), 1)  # views one under another, so that one factor is for all of them
+
+        def loss(phase: Tensor) -> Tensor:
+            spectrum = torch.fft.fft2(model.forward(unit_field(phase)).unflatten(0, (-1, self.frames)))
+            seen = (region.crop(torch.fft.ifft2(spectrum * pupil)).abs().square().mean(1) for pupil in pupils)
+            return intensity_l2(torch.cat(list(seen), dim=-2), wanted).repeat_interleave(self.frames)
+
+        start = random_start(self.frames, target, bench, channel)
+        frames = adam(start, by_autograd(loss), self.iterations, self.step)
+        return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
+
+    def _pupils(self, spec: DisplaySpec) -> Tensor:
+        """Amplitude ``(V, H, W)`` of the eye's pupil at every place, over the frequencies of the image."""
+        band = spec.pupil or 1.0
+        fy, fx = frequencies(spec.shape, spec.pitch)
+        centres = [(0.0, 0.0)]
+        for ring in range(1, self.rings + 1):
+            radius = ring / self.rings * band / (4 * spec.pitch)  # up to half of the iris' [1/m]
+            angles = (math.tau * (place + 0.5) / (6 * ring) for place in range(6 * ring))
+            centres += [(radius * math.sin(angle), radius * math.cos(angle)) for angle in angles]
+        return torch.stack([iris(fy - y, fx - x, spec.pitch, self.pupil * band) for y, x in centres])
