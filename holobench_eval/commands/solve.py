@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import yaml
@@ -27,6 +27,14 @@ def solve(
     output: Annotated[
         Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
     ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A parameter: training.rounds=1 of each method, wirtinger.iterations=50 of that one.",
+        ),
+    ] = None,
     artifacts: Learned = ARTIFACTS,
     retrain: Annotated[bool, RETRAIN] = False,
 ) -> None:
@@ -41,7 +49,7 @@ def solve(
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     decode(read(picture), str(picture), gray=True)  # what is wrong with it is said of the file that was named
-    study_in = partial(_study, names, picture, display, panel)
+    study_in = partial(_study, _entries(names, values or []), picture, display, panel)
     folder = output or next(folder for folder in _folders(picture) if _is_free(folder, picture, study_in(folder)))
     is_new, config = not folder.exists(), folder / STUDY
     _copy(picture, folder)
@@ -105,7 +113,23 @@ def _copy(picture: Path, folder: Path) -> None:
         shutil.copyfile(picture, pictures / picture.name)
 
 
-def _study(methods: list[str], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:
+def _entries(names: list[str], values: list[str]) -> list[Any]:
+    """The methods of a config, with parameters that are ``key=value``: of the method that the key begins with, or of
+    each. UserError for a text that is no such value."""
+    from ..core.yaml_source import parse
+    from ..study.changes import with_value
+
+    params = {name: parse("", "{}") for name in names}
+    for text in values:
+        for name in [name for name in names if text.startswith(f"{name}.")] or names:
+            params[name] = with_value(params[name], text.removeprefix(f"{name}."))
+    return [
+        {"name": _absolute(name), "params": params[name].data} if params[name].data else _absolute(name)
+        for name in names
+    ]
+
+
+def _study(methods: list[Any], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:
     """The study of a picture that lies in a folder."""
     from ..core.installed import shipped_configs
     from ..core.pictures import open_picture
@@ -120,7 +144,7 @@ def _study(methods: list[str], picture: Path, display: str, panel: tuple[int, in
         "display": {"profiles": [profile], "panel": list(panel)},
         "targets": {"dataset": "folder", "params": {"path": str(folder / "picture"), **gray}},
         "training": table3["training"],
-        "methods": [_absolute(method.strip()) for method in methods],
+        "methods": methods,
         "save": {"captures": True, "phases": True},
     }
     return yaml.safe_dump(study, sort_keys=False)

@@ -51,7 +51,7 @@ def changed(document: Document, changes: Changes) -> Document:
     UserError: a key that leads nowhere, or a value that is no YAML.
     """
     for text in changes.values:
-        document = _with_value(document, text)
+        document = with_value(document, text)
     return replace(document, text=f"# changed by {changes}\n{document.text}") if changes else document
 
 
@@ -67,11 +67,12 @@ def chosen(option: str, texts: Sequence[str], allowed: Sequence[str], what: str)
     return names
 
 
-def _with_value(document: Document, text: str) -> Document:
+def with_value(document: Document, text: str) -> Document:
+    """A document with the value of a text ``key=value``. UserError as `changed`."""
     key, equals, value = text.partition("=")
     place = f"--set {text}"
     if not equals or not all(key.split(".")):
-        raise UserError(f"{place}: expected key=value, such as display.panel=[192, 192] or methods.0.label=mine")
+        raise UserError(f"{place}: expected key=value, with dots between nested keys")
     path: Keys = ()
     data = copy.deepcopy(document.data)
     inner: Any = data

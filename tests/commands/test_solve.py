@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from holobench_eval.commands.options import ARTIFACTS, learned_folder
-from holobench_eval.commands.solve import _study, solve
+from holobench_eval.commands.solve import _entries, _study, solve
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import shipped_configs
 from holobench_eval.study.config import load_study
@@ -59,6 +59,16 @@ def test_what_table_3_trained_serves_to_solve(picture: Path) -> None:
     config.write_text(_study(["hil"], Path("out/picture") / picture.name, "leto-2020", (256, 256), Path("out")))
     (own,) = plan(load_study(config)).preparations()
     assert own in plan(load_study(shipped_configs()["table3"])).preparations()
+
+
+def test_parameters_are_set_of_each_method_or_of_one(picture: Path) -> None:
+    given = ["rounds=1", "training.rate=2e-3", "mine.py:f.n=3", "wirtinger.loss=l1"]
+    wirtinger, mine = _entries(["wirtinger", "mine.py:f"], given)
+    assert wirtinger["params"] == {"rounds": 1, "training": {"rate": 0.002}, "loss": "l1"}
+    assert mine["params"] == {"rounds": 1, "training": {"rate": 0.002}, "n": 3}
+    assert _entries(["wirtinger", "double_phase"], ["wirtinger.iterations=3"])[1] == "double_phase"
+    with pytest.raises(UserError, match="--set loss: expected key=value"):
+        _entries(["wirtinger"], ["loss"])
 
 
 def test_the_networks_of_the_clone_are_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,6 +149,8 @@ def test_files_of_others_are_not_replaced(picture: Path) -> None:
         ("double_phase", "text.png", {}, "text.png: not an image"),
         ("double_phase", "picture", {}, "not a picture by its name"),
         ("double_phase", ".hidden.png", {}, "not a picture by its name"),
+        ("wirtinger", "", {"values": ["iterations=many"]}, "'iterations': input should be a whole number, got 'many'"),
+        ("wirtinger,double_phase", "", {"values": ["iterations=2"]}, "'double_phase' has no parameter 'iterations'"),
         ("my picture.png", "wirtinger", {}, r"the picture comes second: holoeval solve METHODS my picture\.png"),
     ],
 )

@@ -83,7 +83,7 @@ FAULTS = [
     (Changes(values=("display={profiles: [idael]}",)), "--set display={profiles: [idael]}: unknown profile 'idael'"),
     (Changes(values=("methods.7.label=x",)), "--set methods.7.label=x: 'methods' is a list; give a number from 0 to 1"),
     (Changes(values=("seed.x=1",)), "--set seed.x=1: 'seed' is a single value and has no 'x'"),
-    (Changes(values=("seed",)), "--set seed: expected key=value, such as"),
+    (Changes(values=("seed",)), "--set seed: expected key=value, with dots"),
     (Changes(values=("seed=[",)), "--set seed=[: "),
     (Changes(values=("seed=1\nrepeats: 3",)), "--set seed=1"),
     (Changes(methods=("wirtinker",)), "--methods wirtinker: no such method in the config; did you mean 'wirtinger'?"),
