@@ -33,7 +33,7 @@ def of_display(results: Results, display: Display, begin: str = "") -> str:
     first = max(rivals, key=lambda rows: sign * rows[0].score.mean, default=[])
     told, parts = list[str](), list[str]()
     for rows, where in (
-        (first, ""),
+        (first, _among(results, first)),
         (groups.get(OPEN_LOOP, []) if first and first is groups.get(CALIBRATED) else [], "without a camera "),
         (groups.get(ONLINE, []), "with photographs of the picture itself "),
     ):
@@ -46,6 +46,15 @@ def of_display(results: Results, display: Display, begin: str = "") -> str:
             parts.append(f"{row.label} {against(results, row)}{published(results, row.label, display.name)}")
     text = f"{begin}{'; '.join(parts)}." if parts else ""
     return text.replace(OTHER, f" against {results.layout.baseline}", 1).replace(OTHER, "")
+
+
+def _among(results: Results, rivals: list[Row]) -> str:
+    """Among whom the best row leads, where the baseline was given more of the camera or the display and is better."""
+    test = rivals[0].test if rivals else None
+    if test is None or not results.headline.better(0.0, test.estimate.mean):
+        return ""
+    knows = results.layout.category(test.first) == ORACLE
+    return "without knowing the display " if knows else "without photographs of the picture itself "
 
 
 def _leads(results: Results, row: Row, tied: list[str]) -> str:

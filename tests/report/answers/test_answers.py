@@ -91,6 +91,14 @@ def test_those_without_a_camera_and_those_with_one_at_the_picture_are_told_apart
     assert text.endswith("itself watching leads (22.05 dB), +5.00 dB [+5.00, +5.00], for 40 photographs.")
 
 
+@pytest.mark.parametrize(
+    ("better", "among"), [("camera", "photographs of the picture itself"), ("privileged", "knowing the display")]
+)
+def test_who_leads_below_a_baseline_of_another_group_leads_among_the_others(better: str, among: str) -> None:
+    found = results_of({"old": 20.0, "plain": 16.0}, **{better: frozenset({"old"})})
+    assert answer(found).startswith(f"without {among} plain leads (16.05 dB), -4.00 dB")
+
+
 def test_the_board_has_tiers_differences_and_the_oracle_apart() -> None:
     table = shown(results_of(COMPARED))
     assert "| A | other | 20.05 | +3.00 [+3.00, +3.00] |" in table
