@@ -44,6 +44,23 @@ def refuse_other_curve(content: bytes) -> None:
         raise PictureError(f"its cICP says {', '.join(map(str, curve[:4]))}, that of sRGB is 1, 13, 0, 1")
 
 
+def bare(content: bytes) -> bytes:
+    """A PNG without the chunks that a decoder may leave out (section 4.3): libpng prints what it thinks of each.
+
+    PictureError for a chunk whose checksum is wrong, of which it prints, too.
+    """
+    kept = [content[:8]]
+    at = 8
+    for kind, data in _chunks(content):
+        end = at + 12 + len(data)
+        if kind[:1].isupper():
+            if zlib.crc32(kind + data) != int.from_bytes(content[end - 4 : end], "big"):
+                raise PictureError("damaged: a checksum of the PNG is wrong")
+            kept.append(content[at:end])
+        at = end
+    return b"".join(kept)
+
+
 def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
     at = 8
     while at + 8 <= len(content):

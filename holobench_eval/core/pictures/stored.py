@@ -89,7 +89,7 @@ class Stored:
             decoded = [_decoded(plane) for plane in tiff.plain(self.content)]
         else:
             _load(self.content)  # which reports truncated files that OpenCV would pad
-            decoded = [_decoded(self.content)]
+            decoded = [_decoded(png.bare(self.content) if self.format == "PNG" else self.content)]
         values = np.stack(decoded, axis=-1) if len(decoded) > 1 else decoded[0]
         if values.ndim == 3 and len(decoded) == 1:
             values = values[..., [2, 1, 0, 3][: values.shape[2]]]  # OpenCV: blue first

@@ -32,6 +32,15 @@ def with_chunk(kind: bytes, content: bytes) -> bytes:
     return png[:33] + chunk(kind, content) + png[33:]
 
 
+def test_a_decoder_prints_nothing_of_a_png(capfd: pytest.CaptureFixture[str]) -> None:
+    good = written(IMAGE)
+    assert open_picture(with_chunk(b"iCCP", b"a\0\0")).values().shape == (40, 50, 3)
+    at = good.index(b"IEND") - 8  # the checksum of the pixels
+    with pytest.raises(PictureError, match="damaged: a checksum of the PNG is wrong"):
+        open_picture(good[:at] + b"none" + good[at + 4 :]).values()
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize("form", ["PNG", "TIFF", "WEBP"])
 def test_alpha_is_left_out_where_it_is_opaque_and_refused_elsewhere(form: str) -> None:
     options = {"lossless": True} if form == "WEBP" else {}
