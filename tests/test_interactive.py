@@ -414,6 +414,7 @@ def test_what_is_no_phase_is_not_saved(display, target, tmp_path: Path, change, 
         (2 * np.pi, {}, []),
         (2 * np.pi, {"two_pi_level": 1024}, ["level 255 is the last; 75% of a turn is shown as the nearer end"]),
         (360, {}, ["the phase has values from 0.00 to 359.64, as degrees have"]),
+        (0.8, {}, ["the phase has values from 0.00 to 0.80, as turns or amplitudes have"]),
     ],
 )
 def test_a_phase_in_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(

@@ -18,6 +18,7 @@ from .api import DisplaySpec, ideal_light, is_plain, nominal_levels, type_name
 RIGHT, BETTER, UNLIKE = 0.85, 0.1, 0.4
 GRAIN = 4  # pixels a side over which speckle is averaged
 FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right phases too may come below UNLIKE
+JUMP = 10 * math.tau  # rad between neighbours, which radians, wrapped or smooth, have no need of
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
 
 UNITS = {  # what values in a span may be, and what makes radians of them
@@ -120,13 +121,17 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
 
 
 def unit_doubt(phase: Tensor) -> str:
-    """Which other unit's span the values of a phase fill from end to end; empty where there is none."""
+    """Which other unit the values of a phase ``(..., H, W)`` seem to have; empty where there is none.
+
+    They fill its span from end to end; or lie in that of turns, or in another one and jump by more than radians would.
+    """
     low, high = (float(value) for value in phase.aminmax())
-    for (first, last), (unit, _) in UNITS.items():
-        gap = EDGE * (last - first)
-        if first <= low <= first + gap and last - gap <= high <= last:
-            return f"has values from {low:.2f} to {high:.2f}, as {unit} have"
-    return ""
+    within = {span: unit for span, (unit, _) in UNITS.items() if span[0] <= low < high <= span[1]}
+    gaps = {span: EDGE * (span[1] - span[0]) for span in within}
+    jumps = any((phase.diff(dim=axis).abs() > JUMP).any() for axis in (-2, -1))
+    units = [within[span] for span, gap in gaps.items() if low <= span[0] + gap and span[1] - gap <= high]
+    units += [within[first, last] for first, last in within if last - first <= 1 or jumps]
+    return f"has values from {low:.2f} to {high:.2f}, as {units[0]} have" if units else ""
 
 
 def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:

@@ -18,7 +18,7 @@ import holobench_eval as hb
 from holobench_eval.commands import app
 from holobench_eval.core.errors import CellError
 from holobench_eval.display import load_profile
-from holobench_eval.display.phases import check_phase, phase_doubt
+from holobench_eval.display.phases import check_phase, phase_doubt, unit_doubt
 from holobench_eval.optics.phase import FARTHEST
 
 TAU = math.tau
@@ -85,6 +85,14 @@ def test_a_unit_is_named_for_values_that_do_not_fill_its_span(display: hb.OpenDi
     for kind in ("turns", "levels over their number", "degrees", "levels"):
         change, remark = ODD[kind]
         assert remark in phase_doubt(change(smooth), target, display.spec)
+
+
+def test_a_unit_is_told_by_its_jumps_where_it_does_not_fill_its_span(phase: Tensor) -> None:
+    degrees = DEGREES * phase.clamp(0.1 * TAU, 0.9 * TAU)
+    assert unit_doubt(degrees).endswith("as degrees have")
+    assert unit_doubt(phase.clamp(0.1, 0.9) / TAU).endswith("as turns or amplitudes have")
+    smooth = torch.linspace(-15, 15, 128) ** 2  # a lens [rad], not wrapped
+    assert unit_doubt(phase) == unit_doubt(5 * phase) == unit_doubt((smooth[:, None] + smooth)[None]) == ""
 
 
 @pytest.mark.parametrize("contrast", [0.01, 0.07])
