@@ -36,7 +36,7 @@ from ...optics.convolution import iris
 from ...study.opening import open_bench
 from .style import METADATA
 
-VERSION = 5  # of the drawing: sheets of another are drawn again
+VERSION = 6  # of the drawing: sheets of another are drawn again
 DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 BOUNDS = (590e-9, 490e-9)  # m, between these colours
@@ -194,7 +194,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     seen = fine[:, middle, :, shape[1] // 2] if along == 0 else fine[middle, :, shape[0] // 2]
     places = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
     axis.step(torch.arange(30), 2 * turns[:30], where="mid", label="commanded")
-    axis.plot(places, seen.T.reshape(-1)[:count] / torch.pi, label="on the panel")
+    axis.step(places, seen.T.reshape(-1)[:count] / torch.pi, where="mid", label="on the panel")
     named = f"the blaze, {cycles:g} cycles / px" if cycles else f"a test ramp, {RAMP:g} cycles / px (no blaze here)"
     axis.set(title=named, xlabel=f"{('row', 'column')[along]} [px]", ylabel="phase [pi rad]")
     axis.legend(fontsize=8)

@@ -23,6 +23,8 @@ def test_a_sheet_shows_the_blaze_and_the_zero_order_that_the_bench_has_and_no_pa
     titles = [axes.get_title() for axes in drawn[0].axes]
     assert ramp in titles
     assert zero_order in titles
+    lines = drawn[0].axes[titles.index(ramp)].lines
+    assert {line.get_drawstyle() for line in lines} == {"steps-mid"}  # a pixel is flat, not a part of a slope
     picture = np.asarray(Image.open(path).convert("L"), dtype=float)
     assert picture.shape[0] > 900
     assert path.stat().st_size <= 200_000
