@@ -193,6 +193,7 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
 def explain_profile(screen: Console, name: str) -> None:
     """Print what a display profile is, the parameters of its stages, and its effects."""
     from ..display import load_profile
+    from ..display.resolution import refuse_far
     from ..report.description import simulated
 
     profile = load_profile(name)
@@ -203,7 +204,12 @@ def explain_profile(screen: Console, name: str) -> None:
     for effect in profile.effects():
         table.add_row(effect.name, escape(effect.text))
     screen.print(table)
-    screen.print(f"holoeval show {name} draws them.", highlight=False)
+    try:
+        refuse_far(profile.spec((256, 256)), profile.panel.distance)
+    except UserError as error:
+        screen.print(escape(str(error)), highlight=False)
+    else:
+        screen.print(f"holoeval show {name} draws them.", highlight=False)
 
 
 def explain_metric(screen: Console, name: str) -> None:

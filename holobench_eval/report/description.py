@@ -142,7 +142,8 @@ def _optics(panel: Panel | DisplaySpec) -> str:
     iris = f"an iris of {panel.pupil:g} of the band" if panel.pupil else "no iris"
     if panel.plane == "fourier":
         iris = f"image in the Fourier plane of a lens, {1 / (panel.pupil or 1):.3g} pixels to a resolved one"
-    return f"optics: pitch {panel.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {panel.bits} bit, {iris}"
+    frames = f", up to {panel.frames} frames an exposure" if panel.frames > 1 else ""
+    return f"optics: pitch {panel.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {panel.bits} bit, {iris}{frames}"
 
 
 def _stages(profile: Profile) -> list[str]:

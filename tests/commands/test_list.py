@@ -92,6 +92,22 @@ SAID = {
 }
 
 
+def test_a_display_says_how_many_frames_it_shows_and_whether_it_is_too_far(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    list_("flc-1bit")
+    said = capsys.readouterr().out
+    assert "up to 8 frames an exposure" in said
+    assert "holoeval show flc-1bit draws them." in said
+    far = tmp_path / "far.yaml"
+    far.write_text("name: far\nversion: 1\nseed: 1\ndescription: Far.\nlike: leto-2020\npanel: {distance: 3.0}\n")
+    list_(str(far))
+    said = " ".join(capsys.readouterr().out.split())
+    assert "too far for 256 x 256 pixels" in said
+    assert "frames" not in said
+    assert "draws them" not in said
+
+
 @pytest.mark.parametrize("name", SAID)
 def test_a_page_says_what_a_name_of_its_kind_needs(pages: dict[str, str], name: str) -> None:
     assert [words for words in SAID[name] if words not in pages[name]] == []
