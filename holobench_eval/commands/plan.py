@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from .output import console as open_console
 
 if TYPE_CHECKING:
     from ..study.artifacts import Artifacts
-    from ..study.definition import Study
+    from ..study.definition import MethodEntry, Study
     from ..study.plan import Plan
     from ..study.store import Store
 
@@ -54,11 +55,12 @@ def plan(
     grid, many = plan_cells(study), options.thread_count(threads, workers, study)
     artifacts = options.learned_folder(artifacts, grid)
     networks = Artifacts(artifacts).networks(grid.preparations().values())
-    rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks)
+    learning = trainings(grid, Artifacts(artifacts))
+    rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks, learning)
     console.print(table(study, rows))
     if all(row.seconds is None for row in rows):
         console.print("No method of it was timed on this machine before; 'holoeval run' says what is left.")
-    if learning := trainings(grid, Artifacts(artifacts)):
+    if learning:
         console.print(training_table(learning))
         if not artifacts.is_dir():
             console.print(
@@ -73,16 +75,17 @@ def plan(
 class Row:
     """A method of a plan.
 
-    label; conditions: displays it is shown on; targets, cells: their numbers; captures: the method's own limit on
-    camera captures, if it has one; done, failed, missing: cells by state; seconds: time its missing solutions would
-    take, from the solutions that were timed before (None: none was).
+    label; conditions: displays it is shown on; targets, cells: their numbers; photographs: the most in total on each
+    display as on the board, those of its training included (None: of floors; NaN: not known before its training); done,
+    failed, missing: cells by state; seconds: time its missing solutions would take, from the solutions that were timed
+    before (None: none was).
     """
 
     label: str
     conditions: int
     targets: int
     cells: int
-    captures: int | None
+    photographs: float | None
     done: int
     failed: int
     missing: int
@@ -114,12 +117,13 @@ def preview(
     workers: int,
     gpu: str = "",
     networks: Mapping[str, str] | None = None,
+    learning: Sequence[TrainingRow] = (),
 ) -> list[Row]:
     """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``; networks:
-    as in ``Store.states``."""
+    as in ``Store.states``; learning: what the plan's methods must learn."""
     from ..study import cost, isolation
 
-    limits = {entry.label: entry.captures or entry.params.get("captures") for entry in study.methods}
+    methods = {entry.label: entry for entry in study.methods}
     states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks)
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
@@ -133,14 +137,14 @@ def preview(
         kinds = Counter(cost.key(task, threads, workers, gpu, apart) for task in unsolved if not task.is_floor)
         known = {kind: seconds for kind in kinds if (seconds := cost.recorded(kind)) is not None}
         estimates = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
-        limit = limits.get(label)
+        targets = len({cell.target for cell in cells})
         rows.append(
             Row(
                 label,
                 conditions=len({cell.condition for cell in cells}),
-                targets=len({cell.target for cell in cells}),
+                targets=targets,
                 cells=len(cells),
-                captures=limit if isinstance(limit, int) else None,
+                photographs=None if label == FLOOR else _photographs(methods[label], study.folder, targets, learning),
                 done=count["done"] + count["unscored"],
                 failed=count["failed"],
                 missing=count["missing"] + count["untimed"],
@@ -148,6 +152,16 @@ def preview(
             )
         )
     return rows
+
+
+def _photographs(entry: MethodEntry, folder: Path, targets: int, learning: Sequence[TrainingRow]) -> float:
+    """Those of a method on a display: of its training, and of every target."""
+    from ..study import isolation
+
+    learned = [row.captures if row.state == "done" else math.nan for row in learning if entry.label in row.needed_by]
+    limits = [limit for limit in (entry.captures, entry.params.get("captures")) if isinstance(limit, int)]
+    each = min(limits, default=math.nan) if isolation.traits(entry.name, folder).camera else 0
+    return targets * each + (mean(learned) if learned else 0)
 
 
 def table(study: Study, rows: list[Row]) -> Table:
@@ -161,17 +175,18 @@ def table(study: Study, rows: list[Row]) -> Table:
     for name in numbers:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
         result.add_column("displays" if name == "conditions" else name, justify="right", footer=total)
-    result.add_column("captures", justify="right")
+    result.add_column("photos", justify="right")
+    result.caption = "photos: at most, in total on each display; ?: known once it is trained"
     timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != FLOOR for row in rows)
     if timed:
         result.add_column("solving", justify="right", footer=f"{'at least ' * untimed}{duration(sum(timed))}")
     for row in rows:
-        limit = "" if row.captures is None else str(row.captures)
+        photos = "" if row.photographs is None else "?" if math.isnan(row.photographs) else f"{row.photographs:.0f}"
         seconds = "" if row.label == FLOOR else "not timed" if row.seconds is None else duration(row.seconds)
         name = "floor images, no method" if row.label == FLOOR else row.label
         counts = (str(getattr(row, name)) for name in numbers)
-        result.add_row(escape(name), *counts, limit, *([seconds] if timed else []))
+        result.add_row(escape(name), *counts, photos, *([seconds] if timed else []))
     return result
 
 

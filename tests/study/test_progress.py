@@ -1,12 +1,13 @@
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from holobench_eval.commands.plan import Row, preview, table
+from holobench_eval.commands.plan import Row, TrainingRow, preview, table
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
@@ -74,6 +75,20 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) ->
     assert all(row.seconds is not None and row.seconds > 0 for row in elsewhere[1:])
 
 
+def test_a_preview_counts_photographs_as_the_board_does(tmp_path: Path) -> None:
+    watching = "{name: online_camera, captures: 9, params: {captures: 12}}"
+    study = load_study(write_config(tmp_path, ("wirtinger", watching, "hil", "hil_plus")))
+    learning = [
+        TrainingRow("hil-a", ("hil",), "done", 62, 1.0),
+        TrainingRow("hil_plus-a", ("hil_plus",), "unfinished", 5, 1.0),
+    ]
+    rows = preview(study, planning.plan(study), Store(tmp_path), threads=1, workers=1, learning=learning)
+    targets = len(study.items)
+    assert [row.photographs for row in rows[:4]] == [None, 0, 9 * targets, 62]
+    assert math.isnan(rows[4].photographs or 0)
+    assert "?" in printed(study, rows)
+
+
 def printed(study: Study, rows: list[Row], width: int = 160) -> str:
     """The table of a preview."""
     text = io.StringIO()
@@ -101,7 +116,7 @@ def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_pat
     lines = printed(load_study(write_config(tmp_path)), rows, width=80).splitlines()
     assert max(map(len, lines)) <= 80
     assert "…" not in "".join(lines)
-    assert all(any(word in line.split() for line in lines) for word in ("displays", "captures", "1222", "2800", "1318"))
+    assert all(any(word in line.split() for line in lines) for word in ("displays", "photos", "1222", "2800", "1318"))
 
 
 def bar(task: planning.Task, is_whole: bool) -> str:
