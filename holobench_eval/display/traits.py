@@ -9,7 +9,9 @@ from typing import Any, Literal, get_args
 from ..core.errors import UserError
 from .api import DisplaySpec
 
-Function = Literal["solve", "solve_planes", "predict", "prepare", "estimates", "available", "files", "external"]
+Function = Literal[
+    "solve", "solve_planes", "predict", "prepare", "estimates", "available", "files", "external", "blind"
+]
 FUNCTIONS: tuple[Function, ...] = get_args(Function)
 
 
@@ -21,7 +23,7 @@ class Traits:
     after all others; planes: solves all planes of a scene at once; fresnel: needs the image in a Fresnel plane; form:
     effects that its model of the display has parameters for; title: its name for people; tuned: what its defaults were
     chosen on; version: of the numbers it gives; timed: False where its seconds mean nothing; functions: those that it
-    has.
+    has, of which ``blind`` says whether the training of a method with its parameters takes no capture.
     """
 
     camera: bool = False

@@ -92,7 +92,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         images[:split],
         images[split:],
         artifacts.memory(preparation),
-        preparation.training.captures,
+        0 if "blind" in traits_of(method).functions and method.blind() else preparation.training.captures,
         preparation.seed,
         shared,
         journal,

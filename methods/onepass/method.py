@@ -70,6 +70,10 @@ class OnePass(ABC):
         """Files that the calibration takes where a machine has them, by what they hold; None for one not there."""
         return self.calibration.external() if self.through != "ideal" else {}
 
+    def blind(self) -> bool:
+        """Whether the training takes no photograph."""
+        return self.through == "ideal"
+
     @abstractmethod
     def network(self, spec: DisplaySpec) -> nn.Module:
         """Amplitude ``(C, H, W)`` at the image plane, zero around the region, to phase ``(C, H, W)`` [rad]; untrained.

@@ -60,6 +60,15 @@ def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
     ]
 
 
+def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path: Path) -> None:
+    config = write(tmp_path, gain())
+    file = tmp_path / "trained.py"
+    blind = "    def blind(self):\n        return True\n\n    def prepare(self"
+    file.write_text(file.read_text().replace("    def prepare(self", blind))
+    reason = compute(config).records[-1]["reason"]
+    assert reason.endswith("has used its 0 captures for training")
+
+
 def test_a_budget_that_is_enough_changes_nothing_but_the_name(tmp_path: Path) -> None:
     free = write(tmp_path)
     compute(free)

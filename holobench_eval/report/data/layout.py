@@ -94,7 +94,8 @@ class Layout:
     holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
     stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
     that is a trained network (None: benches).
-    trained: labels of methods that are trained before they solve; training: on what (None: nothing is trained);
+    trained: labels of methods that are trained before they solve; blind: of those among them whose training takes no
+    photograph; training: on what (None: nothing is trained);
     identities: labels of those whose network is the ideal image itself, which has nothing to learn.
     camera: labels of methods that may capture the scored image while they solve. sweeps: which conditions are changes
     of others. real: whether the display exists. clusters: of every target, such as the photograph of a crop (empty:
@@ -126,6 +127,7 @@ class Layout:
     holograms: str = ""
     learned_display: str | None = None
     trained: frozenset[str] = frozenset()
+    blind: frozenset[str] = frozenset()
     training: TrainingSet | None = None
     identities: frozenset[str] = frozenset()
     camera: frozenset[str] = frozenset()
@@ -152,7 +154,7 @@ class Layout:
             return ORACLE
         if label in self.camera:
             return ONLINE
-        return CALIBRATED if label in self.trained else OPEN_LOOP
+        return CALIBRATED if label in self.trained - self.blind else OPEN_LOOP
 
     @property
     def predicts(self) -> bool:
@@ -162,7 +164,7 @@ class Layout:
     @property
     def spends_captures(self) -> bool:
         """Whether some method takes captures, for its training or while it solves."""
-        return bool(self.trained or self.camera)
+        return bool(self.trained - self.blind or self.camera)
 
     @property
     def text(self) -> Text:
@@ -251,6 +253,12 @@ def layout_of(study: Study) -> Layout:
         holograms=f"{study.holograms.name} ({plain(study.holograms.params)})" if study.predicts else "",
         learned_display=next(iter(names.values())) if study.display.learned else None,
         trained=trained,
+        blind=frozenset(
+            entry.label
+            for entry in study.methods
+            if "blind" in traits[entry.label].functions
+            and isolation.build(entry.name, entry.params, study.folder).blind()
+        ),
         identities=frozenset(entry.label for entry in study.methods if network_of(entry.params) == "identity"),
         training=_training_set(study) if trained or study.display.learned else None,
         camera=frozenset(label for label, method in traits.items() if method.camera),

@@ -19,7 +19,7 @@ import pandas as pd
 from ...core.errors import UserError
 from ...study import provenance
 from ..compare.runs import records_of
-from ..data.categories import CALIBRATED, CATEGORIES, FLOOR, ONLINE, ORACLE
+from ..data.categories import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE
 from ..data.layout import Layout, network_of
 from ..data.results import Results
 from ..data.scores import METRICS, Score, parse
@@ -179,6 +179,7 @@ def _layout(folder: Path, frame: pd.DataFrame, headline: str, baseline: str | No
     """What the tables need of the study, from its records alone."""
     shown = frame[frame["category"] != FLOOR]
     by_category = {name: frozenset(shown.loc[shown["category"] == name, "label"]) for name in CATEGORIES}
+    learned = frozenset(shown.loc[shown["learned_sha256"] != "", "label"]) if "learned_sha256" in shown else frozenset()
     return Layout(
         title=folder.resolve().name,
         pairs=tuple(dict.fromkeys(zip(shown["label"], shown["condition"], strict=True))),
@@ -186,7 +187,8 @@ def _layout(folder: Path, frame: pd.DataFrame, headline: str, baseline: str | No
         headline=headline,
         baseline=baseline,
         privileged=by_category[ORACLE],
-        trained=by_category[CALIBRATED],
+        trained=by_category[CALIBRATED] | learned,
+        blind=by_category[OPEN_LOOP],
         camera=by_category[ONLINE],
         identities=_identities(folder / TABLE),
         measure=str(frame["measure"].iloc[0]),

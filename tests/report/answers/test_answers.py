@@ -17,6 +17,7 @@ from holobench_eval.report.answers import ranks as ranks_kind
 from holobench_eval.report.answers import sweeps as sweeps_kind
 from holobench_eval.report.answers.kind import MOST_WORDS, Kind, subjects
 from holobench_eval.report.data.board import board
+from holobench_eval.report.data.categories import CALIBRATED, OPEN_LOOP
 from holobench_eval.report.data.layout import Swept
 from holobench_eval.study.definition import Claim
 from holobench_eval.study.plan import REFERENCE, is_reference, reference_of
@@ -89,6 +90,15 @@ def test_those_without_a_camera_and_those_with_one_at_the_picture_are_told_apart
     assert text.startswith("trained leads (20.05 dB), +3.00 dB [+3.00, +3.00] against old, for 40 photographs; without")
     assert "without a camera plain leads (18.05 dB), +1.00 dB [+1.00, +1.00]; with photographs of the picture" in text
     assert text.endswith("itself watching leads (22.05 dB), +5.00 dB [+5.00, +5.00], for 40 photographs.")
+
+
+def test_a_network_that_was_trained_without_photographs_stands_among_those_without_a_camera() -> None:
+    networks = frozenset({"net", "trained"})
+    means = {"old": 17.0, "net": 18.0, "trained": 16.0}
+    found = results_of(means, None, {"trained": 5}, trained=networks, blind=frozenset({"net"}))
+    assert answer(found) == "net leads (18.05 dB), +1.00 dB [+1.00, +1.00] against old."
+    groups = {row.label: group for display in board(found).displays for group, rows in display.groups for row in rows}
+    assert groups == {"net": OPEN_LOOP, "old": OPEN_LOOP, "trained": CALIBRATED}
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -69,6 +70,25 @@ def test_clusters_are_those_of_the_dataset_and_rows_whose_network_is_the_ideal_i
     changed = layout_of(load_study(tmp_path / "study.yaml"))
     assert changed.clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life"}
     assert changed.identities == {"none"}
+
+
+def test_a_network_competes_by_whether_its_training_takes_photographs(tmp_path):
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    names = ("holonet", "ccnn", "tensor_holography", "unet_phase")
+    nets = "".join(
+        f"  - {{name: {name}, label: {name} {through}, params: {{through: {through}}}}}\n"
+        for name in names
+        for through in ("ideal", "parametric_model")
+    )
+    config = CONFIG.replace("headline:", nets + "  - hil\ntraining: {dataset: dead_leaves}\nheadline:")
+    (tmp_path / "study.yaml").write_text(config)
+    layout = layout_of(load_study(tmp_path / "study.yaml"))
+    assert [layout.category(f"{name} ideal") for name in names] == ["open loop"] * 4
+    assert [layout.category(f"{name} parametric_model") for name in names] == ["calibrated"] * 4
+    assert layout.category("hil") == "calibrated"
+    assert replace(layout, camera=frozenset()).spends_captures
+    blind = replace(layout, camera=frozenset(), trained=layout.blind)
+    assert not blind.spends_captures
 
 
 def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):

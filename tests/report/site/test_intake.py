@@ -52,6 +52,16 @@ def test_a_folder_of_others_is_taken_in_with_its_thumbnails(handed_in: Path) -> 
     assert page.count("<figure>") == 2
 
 
+def test_a_network_without_photographs_stays_a_network(handed_in: Path) -> None:
+    frame = pd.read_csv(handed_in / "records.csv", dtype=str, keep_default_na=False)
+    assert set(frame.loc[frame["label"] == "Wirtinger", "category"]) == {"open loop"}
+    frame["learned_sha256"] = frame["label"].map({"Wirtinger": "2" * 64}).fillna("")
+    frame.to_csv(handed_in / "records.csv", index=False)
+    layout = read(handed_in, OWN).results.layout
+    assert "Wirtinger" in layout.trained
+    assert layout.category("Wirtinger") == "open loop"
+
+
 @pytest.mark.parametrize(
     ("column", "value", "words"),
     [
