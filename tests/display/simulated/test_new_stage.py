@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import subprocess
 import sys
@@ -122,8 +121,6 @@ def test_lines_of_a_source_add_in_intensity(intensity: Callable[..., Tensor]) ->
     assert not torch.allclose(*alone, rtol=0.1)
 
 
-def test_the_table_of_the_documentation_lists_the_stages_in_lights_order() -> None:
-    text = (ROOT / "docs" / "bench.md").read_text()
-    table = text.split("| stage | model |\n|---|---|\n")[1].split("\n\n")[0]
-    rows = re.findall(r"^\| (.*?) \| (.*) \|$", table, flags=re.MULTILINE)
-    assert rows == [(stage.title, stage.model) for stage in STAGES.values()]
+def test_the_page_of_the_bench_lists_the_stages_in_lights_order() -> None:
+    text = " ".join((ROOT / "docs" / "bench.md").read_text().split())
+    assert ", ".join(stage.title for stage in STAGES.values()) in text
