@@ -190,7 +190,8 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
     Returns
     -------
     object
-        An instance, with keys, types and ranges of its parameters checked.
+        An instance, with keys, types and ranges of its parameters checked; one with a function ``in_folder`` is told
+        where the paths of its parameters start.
 
     Raises
     ------
@@ -204,7 +205,8 @@ def build(kind: Kind, name: str, params: dict[str, Any], folder: Path | None = N
     5
     """
     cls = find(kind, name, folder)
-    return made(cls, f"{kind[:-1]} '{name}'", params, None if is_file(name) else _kept_adapter(kind, name))
+    built = made(cls, f"{kind[:-1]} '{name}'", params, None if is_file(name) else _kept_adapter(kind, name))
+    return built.in_folder(folder) if folder is not None and hasattr(cls, "in_folder") else built
 
 
 def made(cls: type[Any], owner: str, params: dict[str, Any], adapter: TypeAdapter[Any] | None = None) -> Any:

@@ -22,8 +22,9 @@ class Traits:
     camera: captures while it solves; privileged: may see the simulated bench; trains: learns first; follows: is solved
     after all others; planes: solves all planes of a scene at once; fresnel: needs the image in a Fresnel plane; form:
     effects that its model of the display has parameters for; title: its name for people; tuned: what its defaults were
-    chosen on; version: of the numbers it gives; timed: False where its seconds mean nothing; functions: those that it
-    has, of which ``blind`` says whether the training of a method with its parameters takes no capture.
+    chosen on; version: of the numbers it gives; timed: False where its seconds mean nothing; simulates: its phases
+    depend on the code of the simulated bench; functions: those that it has, of which ``blind`` says whether the
+    training of a method with its parameters takes no capture.
     """
 
     camera: bool = False
@@ -37,6 +38,7 @@ class Traits:
     tuned: str | None = None
     version: int = 1
     timed: bool = True
+    simulates: bool = False
     functions: frozenset[Function] = frozenset()
 
     @property
@@ -45,8 +47,8 @@ class Traits:
         return self.camera or self.privileged
 
 
-FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed", "functions"))
-"""What any method may declare; only one that ships may say that it is not timed."""
+FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed", "simulates", "functions"))
+"""What any method may declare; only one that ships may say that it is not timed, or simulates a bench."""
 BOOLEANS = tuple(item.name for item in fields(Traits) if isinstance(item.default, bool) and item.name in FLAGS)
 
 LINE = "text in one line"

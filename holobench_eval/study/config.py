@@ -35,7 +35,7 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     Parameters
     ----------
     path
-        A YAML file; relative paths of code, profiles, benches and weights in it start in its folder, those in
+        A YAML file; relative paths of code, profiles, benches and weights in it start in its folder, other ones in
         ``params`` in the working directory.
     changes
         What the command line changes in it; a fault of such a value is told at its option.
@@ -242,7 +242,10 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
     profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
     with placed(document, (*where, "name"), (*where, "name")):
         for source in profiles:
-            refuse_plane(traits, entry.name, _condition(study, source).spec)
+            spec = _condition(study, source).spec
+            refuse_plane(traits, entry.name, spec)
+            if hasattr(method, "refuse_display"):
+                method.refuse_display(spec)
     return replace(entry, params=isolation.params_of(method), profiles=profiles)
 
 

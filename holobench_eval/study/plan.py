@@ -19,7 +19,7 @@ from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .focal_stacks import Showing, Target, offset, planes_a_scene, planes_of, showings
 from .isolation import read_files
-from .versions import dataset_version, method_version
+from .versions import HARNESS, dataset_version, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells, see ``reference_of``
 PATHS = ("path", "manifest")  # parameters of datasets that say where images lie; each image has its digest
@@ -293,13 +293,15 @@ class _Ground:
         self, cls: type[Any], params: Mapping[str, Any], target: Target, display: Condition, repeat: int, **further: Any
     ) -> dict[str, Any]:
         """The description of a method's phase of a target on a display. further: see ``identity.phase``."""
+        traits = traits_of(cls)
         return identity.phase(
             method_version(cls),
             params,
             self.source | {"sha256": target[1]},
             display.spec,
             (self.study.seed, target[0], repeat),
-            display=identity.seen(display) if traits_of(cls).sees else {},
+            display=identity.seen(display) if traits.sees else {},
+            harness=HARNESS if traits.simulates else "",
             **further,
         )
 

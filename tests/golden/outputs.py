@@ -11,7 +11,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ from tests.support import photographed
 from tests.support.small_training import (
     ROUNDS,
     Memory,
+    modelled,
     pictures,
     quick,
     small_spec,
@@ -235,6 +236,9 @@ def _method(name: str) -> dict[str, Tensor]:
     if getattr(method, "trains", False):
         return _trained(method, small_spec(48, 40, 3))
     display, target = ToyDisplay(aberration=0.3, unmodulated=0.1, noise=0.02), picture()
+    if name == "through":
+        display = replace(display, spec=modelled())
+        (target,) = pictures(display.spec)
     phase = method.solve(target[None], display.handle(method, target))
     found = _of_phase(phase)
     if getattr(method, "planes", False):

@@ -19,8 +19,8 @@ from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.multi_plane import MultiPlane
-from holobench_eval.methods.oracle import Oracle
 from holobench_eval.methods.sgd import AmplitudeSGD
+from holobench_eval.methods.simulated.oracle import Oracle
 from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.replaying import fake_device
 

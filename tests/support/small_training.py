@@ -20,6 +20,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.core import plugins, seeds
+from holobench_eval.display import load_profile
 from holobench_eval.display.api import Capture, DisplaySpec, Region, white_irradiance
 from holobench_eval.display.calibrated import CalibratedBench
 from holobench_eval.display.metered import MeteredDisplay
@@ -51,6 +52,7 @@ QUICK: dict[str, dict[str, Any]] = {
     },
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding
+    "through": {"iterations": 4, "rounds": 2, "profile": "leto-aged"},
     "online_camera": {"captures": 24, "start": _START},
     "online_camera_network": {"captures": 24, "start": _START, "steps": 3, "network": _SMALL},
     "hil": {**_HIL, "start": _EARLY},
@@ -120,6 +122,11 @@ def small_spec(size: int = 64, region: int = 48, colours: int = 1, **optics: Any
     return DisplaySpec(
         "small", (size, size), wavelengths=wavelengths, region=Region(edge, edge, region, region), **nominal
     )
+
+
+def modelled() -> DisplaySpec:
+    """The optics of a display that the profile of ``through`` models, on a panel of few pixels."""
+    return load_profile(QUICK["through"]["profile"]).spec((128, 128))
 
 
 def pictures(spec: DisplaySpec, count: int = 1, first: int = 0) -> Tensor:

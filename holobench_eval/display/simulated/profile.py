@@ -210,6 +210,11 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
 
 
+def profile_files(name: str, folder: Path | None = None) -> list[Path]:
+    """The files of a profile and of those it is like, its own first. UserError as ``load_profile``."""
+    return [Path(document.name) for document in _documents(name, folder)]
+
+
 def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     """The profile of a file, with the values of those it is like. UserError: a fault, with file:line:column."""
     profile = typed(document, Profile, values)

@@ -171,7 +171,8 @@ def measured(names: Iterable[str], folder: Path) -> dict[str, Any]:
 
 
 def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:
-    """Whether a method's functions run in the process of the harness; those that look into the bench always do."""
+    """Whether a method's functions run in the process of the harness; those that look into a bench always do."""
     if isolation == "files":
         return plugins.is_shipped("methods", name)
-    return isolation == "none" or traits(name, folder).privileged
+    declared = traits(name, folder)
+    return isolation == "none" or declared.privileged or declared.simulates

@@ -65,6 +65,7 @@ REGISTRY = {
     "online_camera_network": (VIOLET, "s"),
     "phases": (SKY, "^"),
     "oracle": (BLACK, "D"),
+    "through": (NAVY, "D"),
 }
 
 

@@ -1,4 +1,4 @@
-"""The ceiling of a simulated bench: phase retrieval through the bench itself, which no hardware allows."""
+"""Descent on the expected score of what a simulated bench shows."""
 
 from __future__ import annotations
 
@@ -6,32 +6,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..display.api import Simulation
-from ..display.metered import MeteredDisplay
-from .common import TINY
-from .descent import Best, adam, by_autograd
-from .wirtinger import Wirtinger
+from ...display.api import Simulation
+from ..common import TINY
+from ..descent import Best, adam, by_autograd
 
 
 @dataclass(frozen=True)
-class Oracle:
-    """Adam on the phase for the expected score, differentiated through every stage of the simulated bench.
-
-    It knows all that is fixed about the bench (look-up table, crosstalk, illumination, aberrations, registration), and
-    how strong the noise of a capture is, but not the noise itself. It descends twice: from ``start_iterations`` of
-    Wirtinger, few on purpose, since a converged nominal phase is full of wraps, and where a panel blurs its wraps,
-    descent does not get out of them again; and from the best phase that any other method of the study found for the
-    target on the display. Of all phases it has seen, those others included, the one of the best expected score is
-    returned, per colour: no method is above it, but for the noise of a capture. SI units throughout.
+class BenchDescent:
+    """Adam on the phase for the expected score, differentiated through every stage of a simulated bench.
 
     A descent is made of rounds, each from the best phase so far with the step falling to zero along half a cosine: on
     ``leto-aged`` at 256 px, eight rounds of 20 iterations reached 31.1 dB, four of 40 31.2 dB, and two of 80 30.8 dB.
+    Its start is few iterations of Wirtinger on purpose, since a converged nominal phase is full of wraps, and where a
+    panel blurs its wraps, descent does not get out of them again.
 
     Parameters
     ----------
@@ -53,39 +46,12 @@ class Oracle:
     tolerance: Annotated[float, Interval(gt=0, le=10)] = 0.3
     rounds: Annotated[int, Interval(ge=1, le=1000)] = 10
 
-    title: ClassVar[str] = "descent through the display itself"
-    version: ClassVar[int] = 3
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = True
-    follows: ClassVar[bool] = True
+    def best(self, bench: Simulation, target: Tensor, own: Tensor, others: Sequence[Tensor] = ()) -> Tensor:
+        """The phase ``(C, H, W)`` [rad] of the best expected score, per colour: the colours do not interact.
 
-    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of the best expected score.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            A simulated display that is open to this method; its ``starts`` belong to all images of the batch.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Without a simulated bench.
+        target: linear intensity ``(C, h, w)`` in [0, 1]; own: the start; others: phases of other methods, from the best
+        of which there is a second descent.
         """
-        own = Wirtinger(iterations=self.start_iterations).solve(target, bench)
-        others = [phase.to(target) for phase in bench.starts]
-        pairs = zip(target, own, strict=True)
-        return torch.stack([self._best(bench.simulation, image, start, others) for image, start in pairs])
-
-    def _best(self, bench: Simulation, target: Tensor, own: Tensor, others: Sequence[Tensor]) -> Tensor:
-        """One image: target ``(C, h, w)``, phases ``(C, H, W)``; the colours do not interact."""
         best = Best(own)
         for phase in others:
             best.update(expected_error(phase, bench, target), phase)

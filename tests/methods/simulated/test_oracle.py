@@ -5,10 +5,11 @@ import torch
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.stages.lut import Flicker
-from holobench_eval.methods import oracle
 from holobench_eval.methods.descent import adam
 from holobench_eval.methods.losses import intensity_l2
-from holobench_eval.methods.oracle import Oracle, expected_error, squared_error
+from holobench_eval.methods.simulated import descent
+from holobench_eval.methods.simulated.descent import expected_error, squared_error
+from holobench_eval.methods.simulated.oracle import Oracle
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import match
 from holobench_eval.study.opening import open_bench
@@ -45,7 +46,7 @@ def test_a_better_phase_of_another_method_is_picked_up_in_the_colour_where_it_is
 
 def test_rounds_go_on_until_they_bring_less_than_the_tolerance(bench, scene, monkeypatch):
     calls = []
-    monkeypatch.setattr(oracle, "adam", lambda *args, **kwargs: calls.append(1) or adam(*args, **kwargs))
+    monkeypatch.setattr(descent, "adam", lambda *args, **kwargs: calls.append(1) or adam(*args, **kwargs))
     Oracle(iterations=4, tolerance=10.0).solve(scene(), bench)
     assert len(calls) == 1
     Oracle(iterations=4, tolerance=0.01, rounds=6).solve(scene(), bench)
