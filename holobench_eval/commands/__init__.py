@@ -22,6 +22,7 @@ COMMANDS = {
     "A study": (
         "configs",
         "list_",
+        "displays",
         "plan",
         "run",
         "rescore",

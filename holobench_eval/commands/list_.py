@@ -107,12 +107,17 @@ def _declared(kind: plugins.Kind, name: str) -> type[Any]:
 
 
 def profiles() -> Entries:
-    """Every display profile of the package."""
+    """Every display profile of the package and of installed ones; one with a fault gives that."""
     from ..display import load_profile
     from ..display.simulated.profile import names
+    from ..display.simulated.shelf import installed
 
-    for name in (*names(), *names(family=True)):
-        profile = load_profile(name)
+    for name in (*names(), *names(family=True), *installed()):
+        try:
+            profile = load_profile(name)
+        except UserError as error:
+            yield name, str(error)
+            continue
         yield name, f"version {profile.version}: {profile.description}"
 
 

@@ -18,6 +18,7 @@ def study_schema() -> dict[str, Any]:
     from ..core.json_schema import json_schemas
     from ..display.simulated.changes import KINDS
     from ..display.simulated.profile import names as profiles
+    from ..display.simulated.shelf import installed
     from ..metrics import catalogue, control
     from ..study.definition import Study
     from ..study.focal_stacks import SCORES
@@ -39,7 +40,7 @@ def study_schema() -> dict[str, Any]:
 
     methods, datasets = plugins.names("methods"), plugins.names("datasets")
     method, dataset = _one_of(methods, r"\.py:"), _one_of(datasets, r"\.py:")
-    profile = _one_of([*profiles(), *profiles(family=True)], r"\.ya?ml$")
+    profile = _one_of([*profiles(), *profiles(family=True), *installed()], r"\.ya?ml$")
     for key, definition, choice in (
         ("name", "MethodEntry", method),
         ("name", "Probe", method),

@@ -16,6 +16,7 @@ from ...core.errors import UserError, suggest
 from ...core.schema import typed
 from ...core.yaml_source import Document, load
 from ..api import DisplaySpec
+from .shelf import installed, shelves
 from .stage import Effect, Stage
 from .stages import (
     AddedLens,
@@ -193,7 +194,7 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     Parameters
     ----------
     name
-        One of ``names()``, or the path of a YAML file.
+        One of ``names()`` or of ``shelf.installed()``, or the path of a YAML file.
     folder
         Where a relative path is looked for first.
 
@@ -261,14 +262,18 @@ def _over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _file(name: str, *folders: Path) -> Path:
-    """Where a profile's file is: among those of the package, or in the first of the folders that has it."""
+    """Where a profile's file is: among those of a package, or in the first of the folders that has it."""
     if name.endswith((".yaml", ".yml")):
         candidates = [folder / name for folder in folders]
         path = next((path for path in candidates if path.is_file()), None)
         if path is None:
             raise UserError(f"profile '{name}': no such file: {candidates[0]}")
         return path
+    package, _, own = name.rpartition("/")
+    if package and package in shelves():
+        return shelves()[package].file(own)
     path = next((path for path in (PROFILES / f"{name}.yaml", FAMILY / f"{name}.yaml") if path.is_file()), None)
-    if path is None or Path(name).name != name:
-        raise UserError(f"unknown profile '{name}'; {suggest(name, names())}, or a path to a .yaml file")
+    if path is None or package:
+        known = suggest(name, [*names(), *installed()])
+        raise UserError(f"unknown profile '{name}'; {known}, or a path to a .yaml file")
     return path

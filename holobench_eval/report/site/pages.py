@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from inspect import getdoc
 from typing import Any
 
 from ...core import plugins
+from ...core.errors import UserError
 from ...display.simulated.profile import load_profile, names
+from ...display.simulated.shelf import installed
 from ..answers.comparison import of_display
 from ..data import board as boards
 from ..data.phrases import verdict
@@ -122,18 +125,19 @@ def _shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
 
 
 def _identity(source: Source, name: str) -> tuple[str, str]:
-    """Title and description of a display: those of the package, where it has one of this kind and digest.
+    """Title and description of a display: those of this package, or of another, that has it by this digest.
 
     Another display or version has the beginning of its digest beside its name, or its lab.
     """
     kind = source.known.get("displays", {}).get(name, "simulated")
     digest = source.known.get("profiles", {}).get(name, {}).get("sha256", "")
-    if kind == "simulated" and name in {*names(), *names(family=True)}:
-        profile = load_profile(name)
-        if profile.digest == digest:
-            return name, profile.description
+    known = [name] if name in {*names(), *names(family=True)} else []
+    for shown in [*known, *installed()] if kind == "simulated" else ():
+        with suppress(UserError):  # of others' files
+            if (profile := load_profile(shown)).digest == digest:
+                return shown, profile.description
     other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
-    return f"{name} ({other})", "Another display, or another version of one, than in this package."
+    return f"{name} ({other})", "Another display, or another version of one, than is installed here."
 
 
 def _drawn(row: boards.Row) -> Estimate | None:
