@@ -22,12 +22,12 @@ COMMANDS = {
     "A study": (
         "configs",
         "list_",
-        "displays",
         "plan",
         "run",
         "rescore",
         "reports.report",
         "solve",
+        "displays",
         "show",
         "schema",
     ),
