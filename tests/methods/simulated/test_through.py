@@ -29,8 +29,8 @@ def aged():
 
 
 def test_through_the_profile_of_the_display_it_goes_the_way_of_the_oracle_and_through_none_that_of_wirtinger(aged):
-    short, methods = {"rounds": 2}, [Wirtinger(), Oracle(rounds=2)]
-    methods += [Through(profile="leto-aged", **short), Through(profile="ideal", rounds=1)]
+    through = [Through(profile=profile, rounds=1) for profile in ("leto-aged", "ideal")]
+    methods = [Wirtinger(), Oracle(rounds=1), *through]
     for item in ("astronaut", "coffee"):
         target = Photographs().load(item, aged.spec.region.shape).float()
         handle = aged.for_method(Oracle(), "oracle", target, item, 0)
