@@ -18,6 +18,7 @@ from holobench_eval.methods.learned import fallback, retrieval
 from holobench_eval.methods.learned.retrieval import Image
 from holobench_eval.methods.predictors import veil
 from holobench_eval.methods.predictors.nested import NestedPrediction
+from holobench_eval.methods.simulated import through
 from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.small_training import (
     Fate,
@@ -48,8 +49,8 @@ predicting = pytest.mark.parametrize("name", PREDICTING)
 @pytest.fixture(autouse=True)
 def _short_holograms(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trainings that are compared bit by bit need no converged holograms of dark patterns and of the fallback."""
-    for module in (patterns, veil):
-        monkeypatch.setattr(module, "Wirtinger", lambda: Wirtinger(iterations=5))
+    for module in (patterns, veil, through):
+        monkeypatch.setattr(module, "Wirtinger", lambda iterations=5: Wirtinger(iterations=iterations))
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=5))
 
 

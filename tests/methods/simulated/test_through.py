@@ -24,29 +24,51 @@ methods: [{name: through, params: {profile: lab/mine.yaml}}]
 
 
 @pytest.fixture(scope="module")
-def aged():
-    return open_bench(load_profile("leto-aged"), (128, 128), 1)
+def profiles(tmp_path_factory):
+    """A folder with two profiles of the shipped names, in green alone."""
+    folder = tmp_path_factory.mktemp("profiles")
+    for name in ("leto-aged", "ideal"):
+        (folder / f"{name}.yaml").write_text(f"like: {name}\npanel: {{wavelengths: [5.17e-7]}}\n")
+    return folder
 
 
-def test_through_the_profile_of_the_display_it_goes_the_way_of_the_oracle_and_through_none_that_of_wirtinger(aged):
-    through = [Through(profile=profile, rounds=1) for profile in ("leto-aged", "ideal")]
+@pytest.fixture(scope="module")
+def aged(profiles):
+    return open_bench(load_profile("leto-aged.yaml", profiles), (128, 128), 1)
+
+
+def test_through_the_profile_of_the_display_it_goes_the_way_of_the_oracle_and_through_none_that_of_wirtinger(
+    aged, profiles
+):
+    through = [Through(profile=f"{name}.yaml", rounds=1).in_folder(profiles) for name in ("leto-aged", "ideal")]
     methods = [Wirtinger(), Oracle(rounds=1), *through]
     for item in ("astronaut", "coffee"):
-        target = Photographs().load(item, aged.spec.region.shape).float()
+        target = Photographs().load(item, aged.spec.region.shape, 1).float()
         handle = aged.for_method(Oracle(), "oracle", target, item, 0)
         phases = [method.solve(target[None], handle)[0] for method in methods]
         errors = torch.stack([expected_error(phase, aged.simulation, target).mean() for phase in phases])
         blind, best, model, nominal = (-10 * errors.log10()).tolist()
-        assert blind + 0.8 * (best - blind) < model < best
+        assert blind + 0.8 * (best - blind) < model < best + 0.1
         assert abs(nominal - blind) < 1.5
 
 
+def test_on_the_model_it_is_never_worse_than_wirtinger(profiles):
+    model = open_bench(load_profile("ideal.yaml", profiles), (128, 128), 0)
+    target = torch.zeros(1, *model.spec.region.shape)
+    target[:, 20:80, 30:60] = 0.8
+    handle = model.for_method(Through(), "through", target, "t", 0)
+    idle = Through(profile="ideal.yaml", iterations=1, rounds=1, step=1e-6)  # a descent that finds nothing
+    phases = [method.solve(target[None], handle)[0] for method in (idle.in_folder(profiles), Wirtinger())]
+    through, converged = (expected_error(phase, model.simulation, target) for phase in phases)
+    assert (through <= converged * 1.001).all()
+
+
 def test_it_sees_no_capture_and_no_bench(aged):
-    handle = aged.for_method(Through(), "through", torch.full((3, *aged.spec.region.shape), 0.5), "t", 0)
+    handle = aged.for_method(Through(), "through", torch.full((1, *aged.spec.region.shape), 0.5), "t", 0)
     with pytest.raises(CellError, match="privileged = True"):
         _ = handle.simulation
     with pytest.raises(CellError, match="declares no camera"):
-        handle.capture(torch.zeros(3, 128, 128))
+        handle.capture(torch.zeros(1, 128, 128))
 
 
 @pytest.mark.parametrize(
@@ -57,11 +79,11 @@ def test_it_sees_no_capture_and_no_bench(aged):
             r"its pitch \[m\] is 8e-06, not 6\.4e-06; .*; its blaze \[cycles/px\] is 0, 0\.25,",
         ),
         ("flc-1bit", "its number of bits is 1, not 8"),
-        ("pluto-fourier", r"its list of wavelengths \[m\] is 5\.32e-07, not 6\.36e-07, 5\.17e-07, 4\.46e-07"),
+        ("pluto-fourier", r"its list of wavelengths \[m\] is 5\.32e-07, not 5\.17e-07"),
     ],
 )
 def test_a_profile_of_another_panel_is_refused_in_a_line(aged, profile, faults):
-    target = torch.full((3, *aged.spec.region.shape), 0.5)
+    target = torch.full((1, *aged.spec.region.shape), 0.5)
     handle = aged.for_method(Through(), "through", target, "t", 0)
     with pytest.raises(CellError, match=f"^profile '{profile}' is no model of 'leto-aged': .*{faults}"):
         Through(profile=profile).solve(target[None], handle)
