@@ -49,7 +49,7 @@ def test_through_the_profile_of_the_display_it_goes_the_way_of_the_oracle_and_th
         errors = torch.stack([expected_error(phase, aged.simulation, target).mean() for phase in phases])
         blind, best, model, nominal = (-10 * errors.log10()).tolist()
         assert blind + 0.8 * (best - blind) < model < best + 0.1
-        assert abs(nominal - blind) < 1.5
+        assert abs(nominal - blind) < 0.5
 
 
 def test_on_the_model_it_is_never_worse_than_wirtinger(profiles):
