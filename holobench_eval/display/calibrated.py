@@ -56,7 +56,7 @@ class RegisteredSimulation:
         bench, white, seen = self.bench, white_irradiance(target, self.bench.spec), []
         for channel, resampling in enumerate(self.resamplings[: len(phase)]):
             light = sample(bench.integrated(phase[channel], channel, gain), bench.fine_grid, 1) / white[channel]
-            mean, variance = bench.profile.sensor.expected(light, self.response)
+            mean, variance = bench.profile.sensor.expected(light, self.response, channel)
             seen.append((resampling(mean), resampling.noise_gain * resampling(variance)))
         means, variances = zip(*seen, strict=True)
         return torch.stack(means), torch.stack(variances)

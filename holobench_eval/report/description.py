@@ -153,9 +153,9 @@ def _stages(profile: Profile) -> list[str]:
         stage = getattr(profile, item.name)
         neutral = item.default_factory() if item.default_factory is not MISSING else item.default
         if is_dataclass(stage) and not isinstance(stage, type | Panel) and stage != neutral:
-            values = asdict(stage)
+            values = {key: value for key, value in asdict(stage).items() if key != "maps"}
             for name in PER_COLOUR:
                 if isinstance(values.get(name), tuple):
                     values[name] = values[name][: len(profile.panel.wavelengths)]
             lines.append(f"{item.name.replace('_', ' ')}: {plain(values)}")
-    return lines
+    return [*lines, f"maps hold {', '.join(profile.held)}"] if profile.held else lines

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from holobench_eval.core.json_schema import json_schemas, resolved
+from holobench_eval.display.simulated.maps import KEYS
 from holobench_eval.display.simulated.profile import STAGES, Profile
 from tests.docs.sections import introduction, mappings, section
 
@@ -23,10 +24,24 @@ def page() -> str:
     parts = [introduction(PAGE, MARK), *section("The document", schema, definitions, units=True)]
     for key, entry in schema["properties"].items():
         for name, inner in mappings(key, entry, definitions):
-            note = f"{STAGES[key].title[0].upper()}{STAGES[key].title[1:]}: {STAGES[key].model}."
-            parts += section(f"`{name}`", inner, definitions, note, units=True)
+            parts += section(f"`{name}`", inner, definitions, _note(key), units=True)
     return "\n".join(parts).rstrip("\n") + "\n"
 
+
+def _note(key: str) -> str:
+    if key in STAGES:
+        return f"{STAGES[key].title[0].upper()}{STAGES[key].title[1:]}: {STAGES[key].model}."
+    rows = (
+        f"| `{name}` | {', '.join(each.axes)} | {each.unit} | {each.low:g} to {each.high:g} | {each.meaning} | "
+        f"{', '.join(f'`{other}`' for other in each.instead)} |"
+        for name, each in KEYS.items()
+    )
+    head = "| array | axes | unit | from, to | what it is | takes the place of |\n|---|---|---|---|---|---|"
+    return "\n".join((f"{NOTE}\n", head, *rows))
+
+
+NOTE = """A file of float32 arrays beside the YAML, each optional ([measured maps](#measured-maps)). `rows` and `columns`
+are those of the panel, or fewer, which are enlarged bicubically with corners on corners."""
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")

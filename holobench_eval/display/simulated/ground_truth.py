@@ -34,16 +34,16 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     gain = maps.light.lut_gain.double().mean().cpu() * bench.drift_gain
     levels = torch.arange(1, LEVELS - 1, dtype=torch.float64) / (LEVELS - 1)
     law = stroke(levels, profile.lut.phase(levels * 2**profile.panel.bits, profile.panel.bits, gain, colour))
-    modulated, unmodulated = complex(bench.modulated.mean()), complex(bench.unmodulated.mean())
+    modulated, unmodulated = complex(maps.light.modulated.mean()), complex(maps.light.unmodulated.mean())
     incident = sum(float(line.light.incident.abs().square().mean()) for line in bench.lines[colour])
     light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * incident
     return [
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),
-        estimate("crosstalk", colour, profile.crosstalk.width * math.sqrt(profile.crosstalk.ratio)),
+        estimate("crosstalk", colour, math.sqrt(math.prod(profile.crosstalk.widths(colour)))),
         *undiffracted(unmodulated / modulated * _passed(bench), colour),
         estimate("light", colour, light * float(bench.response.mean())),
-        *stray(profile.stray_light.share, profile.stray_light.reach, colour),
+        *stray(*profile.stray_light.veil(colour), colour),
     ]
 
 

@@ -77,13 +77,6 @@ class SimulatedBench:
         self.image_samples = min(profile.sampling, IMAGE_SAMPLES)
         names = ("bench", profile.name, profile.seed)
         self.ramp = blaze(panel.shape, panel.blaze)
-        self.crosstalk = profile.crosstalk.weights(self.samples)
-        aperture, order = profile.aperture, profile.zero_order
-        active = aperture.active_share(self.samples) if aperture else torch.ones(self.samples**2, 1, 1)
-        dead = aperture.dead_share(self.samples) if aperture else torch.zeros(self.samples**2, 1, 1)
-        grid = (self.samples, self.samples, 1, 1)
-        self.modulated = (order.modulated * active).view(grid).to(device)
-        self.unmodulated = (order.modulated * dead + order.unmodulated).view(grid).to(device, torch.complex64)
         geometries = [
             Geometry(
                 shape=panel.shape,
@@ -124,7 +117,8 @@ class SimulatedBench:
         incident = reduce(mul, present(stage.panel(geometry) for stage in stages)) * demodulation
         if profile.drift.days:
             incident = incident * profile.drift.dust(geometry, noise).to(incident.dtype)
-        power = profile.drift.laser_power(geometry) * profile.illumination.power * share
+        power = profile.drift.laser_power(geometry) * profile.illumination.laser(geometry.channel) * share
+        modulated, unmodulated = self._amplitudes(geometry.channel)
         return ChannelMaps(
             geometry=geometry,
             power=power,
@@ -133,9 +127,9 @@ class SimulatedBench:
                 channel=geometry.channel,
                 lut=profile.lut,
                 crosstalk=profile.crosstalk,
-                weights=self.crosstalk,
-                modulated=self.modulated,
-                unmodulated=self.unmodulated,
+                weights=profile.crosstalk.weights(self.samples, geometry.channel),
+                modulated=modulated,
+                unmodulated=unmodulated,
                 added=reduce(add, present(stage.hologram(geometry) for stage in stages), ramp).to(self.device),
                 lut_gain=profile.lut.gain_map(geometry).to(self.device),
                 incident=(math.sqrt(power) * incident).to(self.device, torch.complex64),
@@ -143,6 +137,16 @@ class SimulatedBench:
             ),
             path=self._path(profile, geometry),
         )
+
+    def _amplitudes(self, channel: int) -> tuple[Tensor, Tensor]:
+        """Of the modulated and of the unmodulated light of each sub-sample, ``(samples, samples, 1, 1)``."""
+        aperture, count = self.profile.aperture, self.samples**2
+        modulated, unmodulated = self.profile.zero_order.amplitudes(channel)
+        active = aperture.active_share(self.samples) if aperture else torch.ones(count, 1, 1)
+        dead = aperture.dead_share(self.samples) if aperture else torch.zeros(count, 1, 1)
+        grid = (self.samples, self.samples, 1, 1)
+        lit, reflected = modulated * active, modulated * dead + unmodulated
+        return lit.view(grid).to(self.device), reflected.view(grid).to(self.device, torch.complex64)
 
     def _path(self, profile: Profile, geometry: Geometry) -> LightPath:
         if geometry.image_pitch is not None:
@@ -152,7 +156,8 @@ class SimulatedBench:
         turning = 1.0 if plane is None else 1 - noise.plane_distance
         ends = [(0.0, 1.0)] if plane is None else [(0.0, turning), (turning, 1.0)]
         legs = [profile.propagation.transfer(geometry, padded, profile.panel.pupil, leg) for leg in ends]
-        rows, columns = sample_weights(padded, self.samples, geometry.blaze, hold=profile.aperture is not None)
+        held, centred = profile.aperture is not None, profile.centred
+        rows, columns = sample_weights(padded, self.samples, geometry.blaze, hold=held, centred=centred)
         fy, fx = frequencies(padded, geometry.pitch)
         for factor in present(stage.transmission(fy, fx, geometry) for stage in profile.stages):
             legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
@@ -231,16 +236,16 @@ class SimulatedBench:
             light = reduce(add, parts)
             light = light / len(shown) if len(shown) > 1 else light
             key = int(torch.randint(2**63 - 1, (), generator=draw))
-            expose = partial(self._expose, light, exposure[channel], key, frame)
+            expose = partial(self._expose, light, exposure[channel], key, frame, channel)
             in_blocks(expose, light, len(frame), frame.numel())
         gain = tuple(electrons * sensor.counts_per_electron for electrons in exposure)
         return Capture(frames, sensor.dark, sensor.white, gain[: len(frames)])
 
-    def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, rows: slice) -> None:
+    def _expose(self, light: Tensor, electrons: float, key: int, frame: Tensor, channel: int, rows: slice) -> None:
         """Fill rows of a frame ``(Hs, Ws)`` with the counts of ``light``, as ``integrated`` gives it."""
         seen = sample(light, self.fine_grid[rows], 1).cpu()
         noise = normal(key, rows, frame.shape[1])
-        frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise)
+        frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise, channel)
 
 
 def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:

@@ -16,6 +16,7 @@ from ...core.errors import UserError, suggest
 from ...core.schema import typed
 from ...core.yaml_source import Document, load
 from ..api import DisplaySpec
+from .maps import KEYS, MapFile, load_maps
 from .shelf import installed, shelves
 from .stage import Effect, Stage
 from .stages import (
@@ -63,14 +64,18 @@ class Profile:
         The nominal, public part: what methods are told.
     sampling
         Sub-samples a pixel and axis at the panel; crosstalk and fill factor need at least 3 [count].
+    centred
+        Whether the light of all sub-samples leaves from the middle of their pixel, as a model of whole pixels has it.
     lens to drift
         The stages. ``dust_plane`` has no keys of its own: its parameters are in ``coherent_noise``.
     residual_bound
         Largest registration residual with which a study may run [region px, rms].
+    maps
+        A file of measured maps, which act in the place of what stages draw.
     like
         A profile, by name or file (from the folder of this one), whose values hold where this file gives none.
     digest
-        sha256 of the file, and of those it is like.
+        sha256 of the file, and of those it is like; the file of maps has one of its own, which stands there.
 
     Examples
     --------
@@ -87,6 +92,7 @@ class Profile:
     description: str
     panel: Panel
     sampling: Annotated[int, Interval(ge=1, le=7)] = 1
+    centred: bool = False
     lens: AddedLens = AddedLens()
     lut: LookUpTable = LookUpTable()
     crosstalk: Crosstalk = Crosstalk()
@@ -104,6 +110,7 @@ class Profile:
     sensor: Sensor = Sensor()
     drift: Drift = Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
+    maps: MapFile | None = None
     like: str | None = None
     digest: str = field(default="", metadata={"key": False})
 
@@ -116,11 +123,28 @@ class Profile:
         """Every effect, in the order in which light meets them; those that are switched off are left out."""
         return [effect for stage in self.stages for effect in stage.effects(self)]
 
-    def plane_faults(self) -> Iterator[tuple[tuple[str, str], str]]:
+    @property
+    def held(self) -> list[str]:
+        """Names of the maps that its stages hold, of ``maps.KEYS``."""
+        return [key for key in KEYS if (name := key.split("."))[1] in getattr(self, name[0]).maps]
+
+    def map_faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Keys that maps have taken the place of, and that are given nevertheless; a table for other levels."""
+        for key in self.held:
+            stage, name = key.split(".")
+            own, neutral = getattr(self, stage), STAGES[stage]()
+            for other in KEYS[key].instead:
+                if getattr(own, other) != getattr(neutral, other):
+                    yield (stage, other), f"{stage}.{other} has no effect beside the map {key}"
+            if key == "lut.table" and own.maps[name].shape[1] != 2**self.panel.bits:
+                yield ("panel", "bits"), f"the map {key} has {own.maps[name].shape[1]} levels, not {2**self.panel.bits}"
+
+    def plane_faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """Keys that have no meaning in a Fourier plane, and why."""
         if self.panel.plane == "fresnel":
             return
         for where, given in (
+            (("centred",), self.centred),
             (("propagation", "pupil_shift"), any(self.propagation.pupil_shift)),
             (("propagation", "obstruction"), self.propagation.obstruction > 0),
             (("coherent_noise", "plane_specks"), self.coherent_noise.plane_specks > 0),
@@ -144,7 +168,7 @@ class Profile:
         Raises
         ------
         UserError
-            A side below 64 or above 8192 pixels.
+            A side below 64 or above 8192 pixels; a panel with maps on another size than its own.
         """
         if shape is None:
             return self
@@ -153,6 +177,9 @@ class Profile:
         rows, columns = (min(given, own) for given, own in zip(shape, self.panel.shape, strict=True))
         if (rows, columns) == self.panel.shape:
             return self
+        if self.held:
+            own = f"{self.panel.shape[0]} x {self.panel.shape[1]}"
+            raise UserError(f"'{self.name}' has maps of its panel of {own} pixels; give that panel, not {list(shape)}")
         distance = self.panel.distance * rows / self.panel.shape[0]
         return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
 
@@ -208,6 +235,10 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     documents.reverse()  # a fault of a base is told of its own file
     merged = accumulate((each.data for each in documents), _over)
     *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
+    if profile.maps is not None:
+        profile = _with_maps(
+            profile, profile.maps, [each for each in documents if "maps" in each.data][-1], documents[-1]
+        )
     return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
 
 
@@ -233,6 +264,28 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     if spectra not in (0, colours):
         message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
         raise document.error(("spectrum", "measured"), message)
+    return profile
+
+
+def _with_maps(profile: Profile, given: MapFile, named: Document, last: Document) -> Profile:
+    """The profile whose stages hold the maps of a file, from the folder of the document that names it."""
+    panel = profile.panel
+    sizes = {
+        "colours": len(panel.wavelengths),
+        "levels": 2**panel.bits,
+        "rows": panel.shape[0],
+        "columns": panel.shape[1],
+    }
+    try:
+        loaded = load_maps(given, Path(named.name).parent, sizes)
+    except UserError as error:
+        raise named.error(("maps", "file"), str(error)) from error
+    for key, values in loaded.items():
+        stage, name = key.split(".")
+        own = getattr(profile, stage)
+        profile = replace(profile, **{stage: replace(own, maps={**own.maps, name: values})})
+    for where, fault in profile.map_faults():
+        raise last.error(where, fault)
     return profile
 
 

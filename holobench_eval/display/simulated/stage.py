@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from torch import Tensor
 
@@ -21,17 +21,27 @@ class Effect:
     text: str
 
 
+@dataclass(frozen=True)
 class Stage:
     """A part of the bench that acts on the light; its dataclass fields are the keys of a profile's YAML.
 
     A stage overrides the hooks of the places where it acts; the others leave the light as it is. ``hologram``,
     ``spectrum``, ``panel`` and ``transmission`` are asked once, when the bench is built, ``image`` in every frame.
 
-    title, model: the stage's row in the table of docs/bench.md; the model names its source.
+    title, model: the stage's row in the table of docs/bench.md; the model names its source. maps: tensors by the names
+    that ``maps.KEYS`` has for the stage, which act in the place of its parameters or beside them.
     """
 
     title: ClassVar[str]
     model: ClassVar[str]
+
+    maps: Mapping[str, Any] = field(
+        default_factory=dict, kw_only=True, repr=False, compare=False, metadata={"key": False}
+    )
+
+    def map_of(self, name: str, channel: int) -> Tensor | None:
+        """What a map holds for a colour; None where there is none."""
+        return self.maps[name][channel] if name in self.maps else None
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """The effects that are switched on in a profile, in the order in which light meets them."""

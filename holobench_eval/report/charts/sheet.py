@@ -53,7 +53,8 @@ STEPS = 60  # of the hologram of the chart: it shows what the bench does, not wh
 
 def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | None = None) -> Path:
     """Draw the stages of a profile on a panel of (rows, columns), 256 x 256 by default; returns the PNG's path."""
-    profile, shape = load_profile(name), panel or (256, 256)
+    profile = load_profile(name)
+    shape = panel or (profile.panel.shape if profile.held else (256, 256))
     path = output or Path(f"stages-{profile.name}.png")
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise UserError(f"--output {path}: a picture is written as .png, .pdf or .svg")
@@ -164,11 +165,9 @@ def _panel_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     axes[0].set(title="look-up table", xlabel="gray level", ylabel="phase [pi rad]")
     axes[0].legend(fontsize=8)
     _picture(axes[1], _middle(bench).light.lut_gain, f"phase gain over the panel{_named(bench)}", "relative gain")
-    offsets, share = profile.crosstalk.kernel()
-    axes[2].plot(offsets, share)
-    axes[2].set(
-        title=f"crosstalk, {profile.crosstalk.width:g} px", xlabel="offset [px]", ylabel="share of a pixel's phase"
-    )
+    width, _ = profile.crosstalk.widths(_index(bench))
+    axes[2].plot(*profile.crosstalk.kernel(channel=_index(bench)))
+    axes[2].set(title=f"crosstalk, {width:g} px", xlabel="offset [px]", ylabel="share of a pixel's phase")
     _wrap_edge(axes[3], bench)
     aperture = profile.aperture or PixelAperture()
     active = aperture.active_share(bench.samples).reshape(bench.samples, bench.samples)
@@ -189,7 +188,7 @@ def _wrap_edge(axis: Axes, bench: SimulatedBench) -> None:
     ramp = (line[:, None] if along == 0 else line[None]).expand(shape)
     level = torch.remainder(torch.round(ramp / (2 * torch.pi) * 2**bench.spec.bits), 2**bench.spec.bits)
     phase = bench.profile.lut.phase(level, bench.spec.bits, _middle(bench).light.lut_gain, _index(bench))
-    fine = bench.profile.crosstalk.apply(phase, bench.crosstalk).view(bench.samples, bench.samples, *shape)
+    fine = bench.profile.crosstalk.apply(phase, _middle(bench).light.weights).view(bench.samples, bench.samples, *shape)
     middle = bench.samples // 2
     seen = fine[:, middle, :, shape[1] // 2] if along == 0 else fine[middle, :, shape[0] // 2]
     places = (torch.arange(count) - (bench.samples - 1) / 2) / bench.samples
@@ -247,7 +246,11 @@ def _veil(axis: Axes, bench: SimulatedBench) -> None:
     row = stage.image(half, bench.profile, _middle(bench).geometry)[height // 2]
     axis.plot(torch.arange(width), half[height // 2], "k:", label="without")
     axis.plot(torch.arange(width), row, label="with")
-    axis.set(title=f"stray light, {100 * stage.share:g} %", xlabel="column [px]", ylabel="relative intensity")
+    axis.set(
+        title=f"stray light, {100 * stage.veil(_index(bench))[0]:g} %",
+        xlabel="column [px]",
+        ylabel="relative intensity",
+    )
     axis.legend(fontsize=8)
 
 
@@ -299,7 +302,7 @@ def _zero_order(axis: Axes, bench: SimulatedBench, phase: Tensor) -> None:
         region, (rows, columns), step = bench.spec.region, bench.spec.shape, bench.spec.step(_index(bench))
         corner = (step * (region.left - columns // 2), step * (region.top - rows // 2))
         axis.add_patch(Rectangle(corner, step * region.width, step * region.height, fill=False, edgecolor="tab:orange"))
-    share = float(bench.unmodulated.mean().abs() ** 2)
+    share = float(_middle(bench).light.unmodulated.mean().abs() ** 2)
     up, across = (-cycles for cycles in profile.panel.blaze)
     if share < SMALLEST_SHARE:
         axis.set_title("light in the iris plane: no zero order")

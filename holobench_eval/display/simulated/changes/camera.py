@@ -67,4 +67,5 @@ def swapped(profile: Profile, name: str) -> Profile:
         raise UserError(f"unknown camera '{name}'; {suggest(name, SENSORS)}")
     old = profile.sensor
     new = replace(SENSORS[name], dark=old.dark, vignetting=old.vignetting, headroom=old.headroom)
-    return replace(profile, sensor=replace(new, ambient=old.ambient, noise=old.noise))
+    maps = {key: values for key, values in old.maps.items() if key != "exponent"}  # the response was the old one's
+    return replace(profile, sensor=replace(new, ambient=old.ambient, noise=old.noise, maps=maps))

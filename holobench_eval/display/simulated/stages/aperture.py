@@ -69,16 +69,16 @@ class ZeroOrder(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Its share of the light."""
+        if "field" in self.maps:
+            shares = ", ".join(percent(abs(light) ** 2) for light in map(complex, *self.maps["field"].T.tolist()))
+            yield Effect("zero_order", f"unmodulated light of {shares} of the modulated, as measured")
         if self.fraction:
             yield Effect("zero_order", f"{percent(self.fraction)} of the light unmodulated")
 
-    @property
-    def modulated(self) -> float:
-        """Amplitude of the modulated light."""
-        return math.sqrt(1 - self.fraction)
-
-    @property
-    def unmodulated(self) -> complex:
-        """Complex amplitude of the unmodulated light."""
+    def amplitudes(self, channel: int) -> tuple[float, complex]:
+        """Of the modulated and of the unmodulated light."""
+        if (own := self.map_of("field", channel)) is not None:
+            return 1.0, complex(*own.tolist())
         amplitude = math.sqrt(self.fraction)
-        return complex(amplitude * math.cos(self.phase), amplitude * math.sin(self.phase))
+        unmodulated = complex(amplitude * math.cos(self.phase), amplitude * math.sin(self.phase))
+        return math.sqrt(1 - self.fraction), unmodulated

@@ -44,18 +44,29 @@ class Crosstalk(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Its width, and the sub-samples that it acts on."""
+        if "width" in self.maps:
+            colours = [self.widths(channel) for channel in range(len(profile.panel.wavelengths))]
+            pairs = ", ".join(f"{down:.3g} px along columns and {along:.3g} along rows" for down, along in colours)
+            yield Effect("crosstalk", f"measured crosstalk of {pairs}")
+            if any(down != along for down, along in colours):
+                yield Effect("uneven_crosstalk", "crosstalk of another width along rows than along columns")
         if self.width:
             yield Effect("crosstalk", f"crosstalk of {self.width:g} px")
             if self.ratio != 1:
                 yield Effect("uneven_crosstalk", f"crosstalk {self.ratio:g} times as wide along rows as along columns")
-        if profile.sampling > 1:
+        if profile.sampling > 1 and not profile.centred:
             grid = f"{profile.sampling} x {profile.sampling}"
             yield Effect("sub_pixel_field", f"structure inside a pixel, {grid} samples, each where it is")
 
-    def weights(self, samples: int) -> Tensor:
+    def widths(self, channel: int) -> tuple[float, float]:
+        """Standard deviations along a column and along a row of pixels [px]."""
+        own = self.map_of("width", channel)
+        return (self.width, self.width * self.ratio) if own is None else (float(own[0]), float(own[1]))
+
+    def weights(self, samples: int, channel: int = 0) -> Tensor:
         """``(2, samples, k)``: the share of each neighbour in each sub-sample, along columns and along rows, exact for
         square pixels."""
-        widths = self.width, self.width * self.ratio
+        widths = self.widths(channel)
         reach = max(1, math.ceil(4 * max(widths)))
         shares = torch.zeros(2, samples, 2 * reach + 1, dtype=torch.float64)
         for axis, width in zip(shares, widths, strict=True):
@@ -70,10 +81,10 @@ class Crosstalk(Stage):
         padded = F.pad(phase[None, None], (reach, reach, reach, reach), mode="replicate")[0, 0]
         return correlate_each(correlate_each(padded, columns, dim=-2), rows, dim=-1).flatten(0, 1)
 
-    def kernel(self, points: int = 101) -> tuple[Tensor, Tensor]:
+    def kernel(self, points: int = 101, channel: int = 0) -> tuple[Tensor, Tensor]:
         """Offsets [pixels] and the share of a pixel at that offset along a column, for a plot."""
         offsets = torch.linspace(-2, 2, points)
-        return offsets, torch.tensor([_share(float(offset), self.width) for offset in offsets])
+        return offsets, torch.tensor([_share(float(offset), self.widths(channel)[0]) for offset in offsets])
 
 
 def _share(offset: float, width: float) -> float:

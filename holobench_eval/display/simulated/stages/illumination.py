@@ -12,6 +12,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..geometry import Geometry
+from ..maps import enlarged
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
@@ -45,6 +46,10 @@ class Illumination(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Beam, fringes, wavefront and tilt."""
+        if "amplitude" in self.maps:
+            yield Effect("beam", "amplitude of the beam, as measured")
+        if "phase" in self.maps:
+            yield Effect("wavefront", "phase of the beam, as measured")
         if self.beam_sigma is not None:
             yield Effect("beam", f"Gaussian beam of {self.beam_sigma:g} panel heights")
         if self.fringes:
@@ -56,21 +61,30 @@ class Illumination(Stage):
             yield Effect("tilt", f"tilt of the beam, {math.hypot(*self.tilt):.2g} cycles a panel height")
 
     def panel(self, geometry: Geometry) -> Tensor:
-        """Complex incident field ``(H, W)`` of unit mean intensity, whatever the power."""
+        """Complex incident field ``(H, W)``, of unit mean intensity but for a measured one, whatever the power."""
         y, x = geometry.coordinates()
+        phase = self.wavefront(geometry) + 2 * math.pi * (self.tilt[0] * y + self.tilt[1] * x)
+        if (own := self.map_of("amplitude", geometry.channel)) is not None:
+            return torch.polar(enlarged(own, geometry.shape).clamp_min(0), phase).to(torch.complex64)
         amplitude = torch.ones(geometry.shape, dtype=torch.float64)
         if self.beam_sigma is not None:
             draw = geometry.generator("beam centre")
             centre = (2 * torch.rand(2, generator=draw, dtype=torch.float64) - 1) * self.offset
             amplitude *= torch.exp(-((y - centre[0]) ** 2 + (x - centre[1]) ** 2) / (2 * self.beam_sigma**2))
         amplitude *= 1 + self.fringes * self._fringes(geometry)
-        phase = self.wavefront(geometry) + 2 * math.pi * (self.tilt[0] * y + self.tilt[1] * x)
         amplitude /= amplitude.pow(2).mean().sqrt()
         return torch.polar(amplitude, phase).to(torch.complex64)
 
     def wavefront(self, geometry: Geometry) -> Tensor:
         """Smooth phase error ``(H, W)`` [rad], without the tilt."""
+        if (own := self.map_of("phase", geometry.channel)) is not None:
+            return enlarged(own, geometry.shape)
         return self.phase_rms * geometry.smooth_map(2.5, "wavefront")
+
+    def laser(self, channel: int) -> float:
+        """Power of a colour, relative to what the camera's exposure was set for."""
+        own = self.map_of("power", channel)
+        return self.power if own is None else self.power * float(own)
 
     def _fringes(self, geometry: Geometry) -> Tensor:
         """Two fringe systems in [-1, 1]; the finer the shorter the wavelength, as between two plane surfaces."""

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ....optics.phase import TAU
 from ..geometry import Geometry
+from ..maps import enlarged
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
@@ -43,12 +44,14 @@ class LookUpTable(Stage):
         """Shape and stroke of the table, and how they vary over the panel."""
         count = len(profile.panel.wavelengths)
         given = self.gamma[:count], self.gain[:count]
-        if self.table:
-            yield Effect("look_up_table", f"a measured look-up table of {len(self.table)} levels")
+        if self.table or "table" in self.maps:
+            yield Effect("look_up_table", f"a measured look-up table of {2**profile.panel.bits} levels")
         elif set(given[0] + given[1]) != {1.0}:
             powers, gains = ("/".join(f"{value:g}" for value in values) for values in given)
             order = " (R/G/B)" * (count > 1)
             yield Effect("look_up_table", f"look-up table, exponent {powers}, stroke {gains} of a turn{order}")
+        if "gain" in self.maps:
+            yield Effect("gain_map", "stroke uneven over the panel, as measured")
         if self.variation:
             yield Effect("gain_map", f"stroke uneven over the panel, {percent(self.variation)} rms, smooth")
         if self.bend:
@@ -57,8 +60,10 @@ class LookUpTable(Stage):
 
     def gain_map(self, geometry: Geometry) -> Tensor:
         """The gain ``(H, W)`` of the panel for a wavelength: the same path is less phase of a longer one."""
-        ripple = self.variation * geometry.smooth_map(2.0, "look-up gain")
         stroke = self.gain[geometry.channel] * (1 - geometry.detuning / geometry.wavelength)
+        if (own := self.map_of("gain", geometry.channel)) is not None:
+            return (stroke * enlarged(own, geometry.shape)).float()
+        ripple = self.variation * geometry.smooth_map(2.0, "look-up gain")
         return (stroke * (1 + ripple)).float()
 
     def bend_map(self, geometry: Geometry) -> Tensor | None:
@@ -68,15 +73,18 @@ class LookUpTable(Stage):
     def phase(self, level: Tensor, bits: int, gain: Tensor, channel: int, bend: Tensor | None = None) -> Tensor:
         """Phase [rad] of gray levels ``(..., H, W)``; differentiable in the level. bend: see ``bend_map``."""
         levels = 2**bits
-        if self.table:
-            return gain * self._tabulated(level, levels)
+        if self.table or "table" in self.maps:
+            return gain * self._tabulated(level, levels, channel)
         fraction = (level / levels).clamp_min(1e-6)
         return gain * TAU * fraction ** (self.gamma[channel] if bend is None else self.gamma[channel] + bend)
 
-    def _tabulated(self, level: Tensor, levels: int) -> Tensor:
-        if len(self.table) != levels:
-            raise ValueError(f"the table has {len(self.table)} entries, the panel {levels} levels")
-        table = torch.tensor(self.table, dtype=torch.float32, device=level.device) / 100 * TAU * (levels - 1) / levels
+    def _tabulated(self, level: Tensor, levels: int, channel: int) -> Tensor:
+        table = self.map_of("table", channel)
+        if table is None:
+            table = torch.tensor(self.table, dtype=torch.float32) / 100 * TAU * (levels - 1) / levels
+        if len(table) != levels:
+            raise ValueError(f"the table has {len(table)} entries, the panel {levels} levels")
+        table = table.to(level.device)
         slope = torch.gradient(table)[0]
         index = level.detach().round().long() % levels
         return table[index] + slope[index] * (level - level.detach())
@@ -84,7 +92,9 @@ class LookUpTable(Stage):
     def curve(self, bits: int, channel: int) -> Tensor:
         """Phase [rad] of every gray level at the mean gain, for a plot."""
         level = torch.arange(2**bits, dtype=torch.float32)
-        return self.phase(level, bits, torch.tensor(self.gain[channel]), channel)
+        own = self.map_of("gain", channel)
+        gain = torch.tensor(self.gain[channel]) * (1 if own is None else own.mean())
+        return self.phase(level, bits, gain, channel)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from ....optics.angular_spectrum import angular_spectrum_phase
 from ....optics.convolution import frequencies, iris
-from ....optics.zernike import wavefront
+from ....optics.zernike import NAMES, wavefront
 from ..geometry import Geometry
 from ..stage import Effect, Stage, percent
 from .crosstalk import sample_positions
@@ -50,6 +50,12 @@ class Propagation(Stage):
         if self.distance_error or self.wavelength_error:
             wavelength = f"{percent(self.wavelength_error)} of the wavelength"
             yield Effect("defocus", f"wrong by {percent(self.distance_error)} of the distance, {wavelength}")
+        for name, radians in zip(
+            NAMES, self.maps["aberration"].T.tolist() if "aberration" in self.maps else [], strict=False
+        ):
+            if any(radians) and not self.aberration.get(name):
+                text = ", ".join(f"{value:.3g}" for value in radians)
+                yield Effect(name, f"aberration {name.replace('_', ' ')}, {text} rad rms, as measured")
         for name, waves in self.aberration.items():
             if waves:
                 yield Effect(name, f"aberration {name.replace('_', ' ')}, {waves:g} waves rms at 517 nm")
@@ -72,7 +78,8 @@ class Propagation(Stage):
         wavelength, radius = geometry.wavelength * (1 + self.wavelength_error), math.hypot(*geometry.shape) / 2
         defocus = -math.pi * self.distance_error * geometry.pitch**2 / (wavelength * geometry.distance)
         aberration = wavefront(self.aberration, *torch.broadcast_tensors(y / radius, x / radius))
-        return defocus * (y * y + x * x) + aberration * (517e-9 / geometry.wavelength)
+        measured = self._measured(y / radius, x / radius, geometry)
+        return defocus * (y * y + x * x) + aberration * (517e-9 / geometry.wavelength) + measured
 
     def transfer(
         self, geometry: Geometry, padded: tuple[int, int], pupil: float | None, fraction: tuple[float, float]
@@ -106,23 +113,33 @@ class Propagation(Stage):
         scale = 2 * geometry.pitch / (pupil or 1.0)
         y, x = torch.broadcast_tensors(fy * scale, fx * scale)
         beyond = torch.sqrt(y * y + x * x).clamp_min(1.1) / 1.1
-        return wavefront(self.aberration, y / beyond, x / beyond) * (517e-9 / geometry.wavelength)
+        aberration = wavefront(self.aberration, y / beyond, x / beyond) * (517e-9 / geometry.wavelength)
+        return aberration + self._measured(y, x, geometry)
+
+    def _measured(self, y: Tensor, x: Tensor, geometry: Geometry) -> Tensor | float:
+        """What the map adds at points of which the pupil is the unit disc [rad]."""
+        own = self.map_of("aberration", geometry.channel)
+        if own is None:
+            return 0.0
+        waves = {name: value / (2 * math.pi) for name, value in zip(NAMES, own.tolist(), strict=True) if value}
+        return wavefront(waves, y, x) * (torch.hypot(y, x) <= 1)
 
 
 def sample_weights(
-    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool
+    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool, centred: bool = False
 ) -> tuple[Tensor, Tensor]:
     """Weights that add the spectra of the sub-samples to that of the panel, ``(samples, padded)`` for each axis.
 
     Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency). The
     spectra are those of fields whose carrier ``blaze`` [cycles per pixel] has been taken off pixel by pixel, so the
-    light of frequency f left the panel at f + blaze.
+    light of frequency f left the panel at f + blaze. Centred: all sub-samples send their light from the pixel's centre.
     """
     axes = []
     for size, carrier in zip(padded, blaze, strict=True):
         f = torch.fft.fftfreq(size, dtype=torch.float64) + carrier
         envelope = torch.sinc(f / samples) if hold else torch.ones_like(f)
-        angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * f
+        turning = torch.full_like(f, carrier) if centred else f
+        angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * turning
         weights = torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples
         axes.append(weights.to(torch.complex64))
     return axes[0], axes[1]

@@ -20,12 +20,14 @@ from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
 from ..geometry import Geometry
 from ..kernels import Plane, box_back_rows, box_rows, count_rows, counts
+from ..maps import enlarged
 from ..stage import Effect, Stage, percent
 
 if TYPE_CHECKING:
     from ..profile import Profile
 
 IMAGE_SAMPLES = 2  # at most, a pixel and axis of the image; a smaller sensor pixel averages nothing
+DARKEST = 1e-6  # of a white pixel, below which the slope of a measured response is not followed
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,13 @@ class Sensor(Stage):
         size = self.panel_pixels(profile)
         if size * min(profile.sampling, IMAGE_SAMPLES) > 1:
             yield Effect("sensor_area", f"sensor pixels that average over {size:.2g} px")
+        if "shading" in self.maps:
+            yield Effect("shading", "brightness uneven over the image, as measured")
+        if "exponent" in self.maps:
+            text = "/".join(f"{value:.3g}" for value in self.maps["exponent"].tolist())
+            yield Effect("response", f"response with the exponent {text}, as measured")
+        if "ambient" in self.maps:
+            yield Effect("offset", "light that is always there, as measured")
         if self.vignetting:
             yield Effect("vignetting", f"vignetting, {percent(self.vignetting)} at the corner")
         if self.prnu:
@@ -72,13 +81,32 @@ class Sensor(Stage):
             yield Effect("noise", f"shot noise of {self.full_well:g} electrons, read noise of {self.read_noise:g}")
 
     def image(self, light: Tensor, profile: Profile, geometry: Geometry) -> Tensor:
-        """The mean over the area of a sensor pixel around each sample."""
+        """The mean over the area of a sensor pixel around each sample, of the light behind a measured shading."""
         samples = light.shape[-2] // geometry.shape[0]
+        if (own := self.map_of("shading", geometry.channel)) is not None:
+            light = light * self._shading(own, geometry.shape, samples).to(light)
         return box_filter(light, samples * self.panel_pixels(profile))
 
     def panel_pixels(self, profile: Profile) -> float:
         """Side of a sensor pixel in pixels of the image."""
         return self.pitch / (profile.relay.magnification * profile.spec().image_pitch)
+
+    def _shading(self, own: Tensor, shape: tuple[int, int], samples: int) -> Tensor:
+        """At all samples; the last ones lie beyond the centres of the last pixels, and have their values."""
+        rows, columns = (samples * (side - 1) + 1 for side in shape)
+        inner = enlarged(enlarged(own, shape), (rows, columns)).clamp_min(0)
+        beyond = (0, samples - 1, 0, samples - 1)
+        return F.pad(inner[None], beyond, mode="replicate")[0]
+
+    def toned(self, light: Tensor, channel: int) -> Tensor:
+        """What the sensor makes of light, both 1 at a white pixel, where its response is a measured power."""
+        own = self.map_of("exponent", channel)
+        return light if own is None else light.clamp_min(DARKEST) ** float(own)
+
+    def surrounding(self, channel: int) -> float:
+        """Light on every pixel, of a white one."""
+        own = self.map_of("ambient", channel)
+        return self.ambient if own is None else self.ambient + float(own)
 
     @property
     def white(self) -> float:
@@ -99,13 +127,16 @@ class Sensor(Stage):
         pattern = torch.randn(rows, columns, generator=geometry.generator("fixed pattern"))
         return falloff * (1 + self.prnu * pattern)
 
-    def expose(self, light: Tensor, electrons: float, response: Tensor, normal: Tensor) -> Tensor:
+    def expose(self, light: Tensor, electrons: float, response: Tensor, normal: Tensor, channel: int = 0) -> Tensor:
         """Counts [DN] ``(Hs, Ws)`` of ``light`` (mean incident light on the panel is 1) at ``electrons`` per unit.
 
         Shot noise is the normal approximation of Poisson noise; its error is below the read noise above 20 e-.
         normal: standard normal numbers ``(Hs, Ws)``, one for the noise of each pixel.
         """
-        ambient = self.ambient * self.full_well / self.headroom
+        white = self.full_well / self.headroom  # electrons
+        ambient = self.surrounding(channel) * white
+        if "exponent" in self.maps:
+            light = self.toned(light * (electrons / white), channel) * (white / electrons)
         if not self.noise:
             charge = response * (light * electrons + ambient)
             return (charge * self.counts_per_electron + self.dark).clamp(max=self.white)
@@ -118,13 +149,13 @@ class Sensor(Stage):
         count_rows(*planes, electrons, ambient, numbers, counted.numpy())
         return counted
 
-    def expected(self, light: Tensor, response: Tensor) -> tuple[Tensor, Tensor]:
+    def expected(self, light: Tensor, response: Tensor, channel: int = 0) -> tuple[Tensor, Tensor]:
         """Mean and variance of what ``expose`` gives above the dark level, differentiable.
 
         The unit is that of ``light`` ``(Hs, Ws)``: a white pixel, which fills the well to 1 / headroom.
         """
         white = self.full_well / self.headroom  # electrons
-        charge = response * white * (light + self.ambient)
+        charge = response * white * (self.toned(light, channel) + self.surrounding(channel))
         bent = charge - self.nonlinearity / self.full_well * charge.square() if self.noise else charge
         mean = bent.clamp(max=self.full_well) / white
         if not self.noise:

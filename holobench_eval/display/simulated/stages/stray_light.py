@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -34,16 +34,44 @@ class StrayLight(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Its share and reach."""
-        if self.share:
+        if "blur" in self.maps:
+            yield Effect("blur", "blur of the image, as measured")
+        if "share" in self.maps or "reach" in self.maps:
+            shares = ", ".join(percent(self.veil(channel)[0]) for channel in range(len(profile.panel.wavelengths)))
+            yield Effect("stray_light", f"{shares} of the light scattered, as measured")
+        elif self.share:
             text = f"{percent(self.share)} of the light scattered over {self.reach:g} panel heights"
             yield Effect("stray_light", text)
 
+    def veil(self, channel: int) -> tuple[float, float]:
+        """Share that is spread, and its reach [panel heights]."""
+        share, reach = self.map_of("share", channel), self.map_of("reach", channel)
+        return self.share if share is None else float(share), self.reach if reach is None else float(reach)
+
     def image(self, light: Tensor, profile: Profile, geometry: Geometry) -> Tensor:
         """The light with its veil."""
-        if not self.share:
-            return light
-        spread = max(1.0, self.reach * light.shape[-2])  # a narrower one would not keep the power
-        return (1 - self.share) * light + self.share * gaussian(light, spread)
+        share, reach = self.veil(geometry.channel)
+        widths = self.map_of("blur", geometry.channel)
+        sharp = light if widths is None else blurred(light, widths.tolist(), light.shape[-2] // geometry.shape[0])
+        if not share:
+            return sharp
+        spread = max(1.0, reach * light.shape[-2])  # a narrower one would not keep the power
+        return (1 - share) * sharp + share * gaussian(light, spread)
+
+
+def blurred(light: Tensor, widths: Sequence[float], per_pixel: int) -> Tensor:
+    """An image ``(n H, n W)``, n samples a pixel and axis, with each sample the mean of those that lie whole pixels
+    from it, under a Gaussian of standard deviations ``widths`` along columns and rows [px]; flat light stays flat."""
+    rows, columns = (side // per_pixel for side in light.shape)
+    down, along = (_means(side, width, light) for side, width in zip((rows, columns), widths, strict=True))
+    split = light.view(rows, per_pixel, columns, per_pixel)
+    return torch.einsum("ab,bicj,dc->aidj", down, split, along).reshape(light.shape)
+
+
+def _means(side: int, width: float, like: Tensor) -> Tensor:
+    places = torch.arange(side, dtype=torch.float64)
+    weights = torch.exp(-((places[:, None] - places) ** 2) / (2 * max(width, 1e-3) ** 2))
+    return (weights / weights.sum(1, keepdim=True)).to(like)
 
 
 def gaussian(light: Tensor, spread: float) -> Tensor:

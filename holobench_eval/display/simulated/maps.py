@@ -1,0 +1,195 @@
+"""Measured maps of a display: a file of arrays beside its profile, which act in the place of what the profile draws."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path, PurePath
+from typing import Annotated
+
+import numpy as np
+import torch
+from annotated_types import Interval, MinLen
+from torch import Tensor
+from torch.nn import functional
+
+from ...core.errors import UserError, suggest
+from ...core.files import open_regular
+from ...core.hashing import State, file_state
+from ...optics.zernike import NAMES
+
+LARGEST = 20_000_000  # bytes of a file, and of its arrays
+HEADERS = 10_000  # bytes of the header of each array, at most
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """The file of a profile's maps, and what it held when the profile was written.
+
+    file: an ``npz`` in the folder of the profile, or below it; size: of the file, at most 20 MB [bytes]; sha256: of the
+    file, 64 hexadecimal digits.
+    """
+
+    file: Annotated[str, MinLen(1)]
+    size: Annotated[int, Interval(ge=1, le=LARGEST)]
+    sha256: Annotated[str, MinLen(64)]
+
+
+@dataclass(frozen=True)
+class Map:
+    """What an array is. axes: of it, the first of which is the colour; low, high: of its values; instead: keys of the
+    stage that it takes the place of, and which the profile may not give beside it."""
+
+    axes: tuple[str, ...]
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    instead: tuple[str, ...] = ()
+
+
+COLOURS, PAIR, OVER = ("colours",), ("colours", "2"), ("colours", "rows", "columns")
+KEYS: Mapping[str, Map] = {
+    "lut.table": Map(
+        ("colours", "levels"), "rad", -100, 100, "phase of each level", ("gamma", "bend", "table")
+    ),
+    "lut.gain": Map(OVER, "1", 0, 10, "factor of the phase over the panel, beside `gain`", ("variation",)),
+    "crosstalk.width": Map(
+        PAIR, "px", 0, 2, "standard deviation along a column and along a row of pixels", ("width", "ratio")
+    ),
+    "illumination.amplitude": Map(
+        OVER, "1", 0, 100, "of the light over the panel, whose mean square is the light's share of the nominal",
+        ("beam_sigma", "offset", "fringes"),
+    ),
+    "illumination.phase": Map(OVER, "rad", -1000, 1000, "of the light over the panel, without `tilt`", ("phase_rms",)),
+    "illumination.power": Map(COLOURS, "1", 0, 100, "factor of `power`"),
+    "propagation.aberration": Map(
+        ("colours", "modes"), "rad rms", -100, 100,
+        f"at that colour, beside `aberration`: {', '.join(NAMES)}; none beyond the edge of the iris, or of the band",
+    ),
+    "zero_order.field": Map(
+        PAIR, "1", -10, 10,
+        "unmodulated light, real and imaginary part, where the modulated light has the amplitude 1",
+        ("fraction", "phase"),
+    ),
+    "stray_light.blur": Map(
+        PAIR, "px", 0, 20, "standard deviation of a Gaussian along columns and rows, of light that is not scattered"
+    ),
+    "stray_light.share": Map(COLOURS, "share of the light", 0, 1, "that is spread", ("share",)),
+    "stray_light.reach": Map(COLOURS, "panel heights", 1e-4, 10, "of what is spread", ("reach",)),
+    "sensor.shading": Map(OVER, "1", 0, 1000, "factor of the light over the image"),
+    "sensor.exponent": Map(
+        COLOURS, "1", 0.1, 10, "of the response: light of L white pixels is counted as L^exponent of them"
+    ),
+    "sensor.ambient": Map(COLOURS, "of a white pixel", -1, 10, "light that is always there, beside `ambient`"),
+}  # fmt: skip
+"""Every array that a file may hold, by stage and name, in the order of the stages."""
+
+
+def load_maps(given: MapFile, folder: Path, sizes: Mapping[str, int]) -> dict[str, Tensor]:
+    """The maps of a profile, by ``KEYS``.
+
+    Parameters
+    ----------
+    given
+        The file's name, size and SHA-256, as the profile has them.
+    folder
+        Of the profile.
+    sizes
+        Of the axes ``colours``, ``levels``, ``rows`` and ``columns``; a map over the panel may be coarser.
+
+    Raises
+    ------
+    UserError
+        A file that is elsewhere, another than was named, damaged or too large; an array that is unknown, of another
+        type or shape, or with values beyond its range.
+    """
+    path = _inside(given.file, folder)
+    state = file_state(path)
+    if state is None:
+        raise UserError(f"no such file: {path}")
+    loaded = _loaded(path, state, given.size, given.sha256)
+    for key, values in loaded.items():
+        axes = KEYS[key].axes
+        wanted = tuple(sizes.get(axis) or (len(NAMES) if axis == "modes" else int(axis)) for axis in axes)
+        coarser = (
+            axes == OVER
+            and values.ndim == 3
+            and all(2 <= n <= most for n, most in zip(values.shape[1:], wanted[1:], strict=True))
+        )
+        if tuple(values.shape) != wanted and not (coarser and len(values) == wanted[0]):
+            names = f"({', '.join(axes)}), here {wanted}{', or with fewer rows and columns' * (axes == OVER)}"
+            raise UserError(f"{path.name}: '{key}' has the shape {tuple(values.shape)}; expected {names}")
+    return loaded
+
+
+def _inside(name: str, folder: Path) -> Path:
+    """Where the file is. UserError: not within the folder, or only by a link."""
+    if PurePath(name).is_absolute() or ".." in PurePath(name).parts:
+        raise UserError(f"{name!r} is not a file in the profile's folder; give its name, or a path below that folder")
+    path = folder / name
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise UserError(f"{name!r} is a link to a file outside the profile's folder; copy that file there")
+    return path
+
+
+@lru_cache(maxsize=4)
+def _loaded(path: Path, _state: State, size: int, sha256: str) -> dict[str, Tensor]:
+    """The arrays of a file that is as the profile says; read once while it stays as it is."""
+    try:
+        with open_regular(path, LARGEST) as file:
+            content = file.read(LARGEST)
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+    if len(content) != size:
+        raise UserError(f"{path.name} has {len(content)} bytes, and the profile says {size}: another file, or damaged")
+    if hashlib.sha256(content).hexdigest() != sha256.lower():
+        raise UserError(f"{path.name} has another SHA-256 than the profile says: another file, or damaged")
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            return _arrays(archive, path.name)
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, RuntimeError, NotImplementedError) as error:
+        reason = " ".join(str(error).split())[:100]
+        raise UserError(f"{path.name} is no npz file of plain arrays, as numpy.savez writes it ({reason})") from error
+
+
+def _arrays(archive: zipfile.ZipFile, name: str) -> dict[str, Tensor]:
+    entries = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+    if unknown := [key for key in entries if key not in KEYS]:
+        raise UserError(f"{name}: no display has a map {unknown[0][:60]!r}; {suggest(unknown[0][:60], KEYS)}")
+    if sum(entry.file_size for entry in entries.values()) > LARGEST + HEADERS * len(entries):
+        raise UserError(f"{name}: its arrays are larger than {LARGEST / 1e6:g} MB in all")
+    return {key: _array(archive.read(entry), key, name) for key, entry in entries.items()}
+
+
+def _array(content: bytes, key: str, name: str) -> Tensor:
+    """An array whose header was looked at first, which may promise more than there is."""
+    stream = io.BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = header(stream, max_header_size=HEADERS)
+    if dtype != np.dtype("<f4"):
+        raise UserError(f"{name}: '{key}' is of the type {str(dtype)[:40]}; expected float32")
+    if 4 * math.prod(shape) != len(content) - stream.tell():
+        raise ValueError(f"'{key}' is shorter or longer than its shape")
+    values = np.load(io.BytesIO(content), allow_pickle=False)
+    known = KEYS[key]
+    if not (np.isfinite(values).all() and known.low <= values.min(initial=known.low)):
+        raise UserError(f"{name}: '{key}' has values that are not finite or below {known.low:g}")
+    if values.max(initial=known.low) > known.high:
+        raise UserError(f"{name}: '{key}' has values above {known.high:g}")
+    return torch.from_numpy(np.ascontiguousarray(values))
+
+
+def enlarged(values: Tensor, shape: tuple[int, int]) -> Tensor:
+    """A map ``(h, w)`` at every pixel of a panel ``(H, W)``, bicubically with corners on corners; float64."""
+    values = values.double()
+    if tuple(values.shape) == shape:
+        return values
+    return functional.interpolate(values[None, None], size=shape, mode="bicubic", align_corners=True)[0, 0]
