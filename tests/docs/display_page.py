@@ -40,8 +40,8 @@ def _note(key: str) -> str:
     return "\n".join((f"{NOTE}\n", head, *rows))
 
 
-NOTE = """A file of float32 arrays beside the YAML, each optional ([measured maps](#measured-maps)). `rows` and `columns`
-are those of the panel, or fewer, which are enlarged bicubically with corners on corners."""
+NOTE = """A file of float32 arrays beside the YAML, each optional ([measured maps](#measured-maps)). `rows` and
+`columns` are those of the panel, or fewer, which are enlarged bicubically with corners on corners."""
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
