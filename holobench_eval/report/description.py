@@ -117,6 +117,8 @@ def simulated(
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated, with parameters that are assumed or from data sheets and measured on no panel"
+    if profile.held:
+        return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:
         return f"{measured}; drawn from ranges, and kept since its captures have published figures"
     try:
@@ -158,4 +160,4 @@ def _stages(profile: Profile) -> list[str]:
                 if isinstance(values.get(name), tuple):
                     values[name] = values[name][: len(profile.panel.wavelengths)]
             lines.append(f"{item.name.replace('_', ' ')}: {plain(values)}")
-    return [*lines, f"maps hold {', '.join(profile.held)}"] if profile.held else lines
+    return lines

@@ -42,7 +42,7 @@ FORM = frozenset(
     {
         *("blaze", "look_up_table", "gain_map", "crosstalk", "beam", "wavefront", "tilt", "zero_order", "drift"),
         *MODES,
-        "stray_light",
+        *("stray_light", "offset"),
     }
 )
 

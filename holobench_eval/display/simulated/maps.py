@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import torch
-from annotated_types import Interval, MinLen
+from annotated_types import Interval
 from torch import Tensor
 from torch.nn import functional
 
@@ -38,13 +38,13 @@ HEADER = re.compile(
 class MapFile:
     """The file of a profile's maps, and what it held when the profile was written.
 
-    file: an ``npz`` in the folder of the profile, or below it; size: of the file, at most 20 MB [bytes]; sha256: of the
-    file, 64 hexadecimal digits.
+    file: an ``npz`` in the folder of the profile, or below it, null for no maps; size: of the file, at most 20 MB
+    [bytes]; sha256: of the file, 64 hexadecimal digits.
     """
 
-    file: Annotated[str, MinLen(1)]
-    size: Annotated[int, Interval(ge=1, le=LARGEST)]
-    sha256: Annotated[str, MinLen(64)]
+    file: str | None = None
+    size: Annotated[int, Interval(ge=0, le=LARGEST)] = 0
+    sha256: str | None = None
 
 
 @dataclass(frozen=True)
@@ -116,6 +116,8 @@ def load_maps(given: MapFile, folder: Path, sizes: Mapping[str, int]) -> dict[st
         A file that is elsewhere, another than was named, damaged or too large; an array that is unknown, of another
         type or shape, or with values beyond its range.
     """
+    if given.file is None:
+        return {}
     path = _inside(given.file, folder)
     state = file_state(path)
     if state is None:
@@ -146,7 +148,7 @@ def _inside(name: str, folder: Path) -> Path:
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, _state: State, size: int, sha256: str) -> dict[str, Tensor]:
+def _loaded(path: Path, _state: State, size: int, sha256: str | None) -> dict[str, Tensor]:
     """The arrays of a file that is as the profile says; read once while it stays as it is."""
     try:
         with open_regular(path, LARGEST) as file:
@@ -155,7 +157,7 @@ def _loaded(path: Path, _state: State, size: int, sha256: str) -> dict[str, Tens
         raise UserError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) != size:
         raise UserError(f"{path.name} has {len(content)} bytes, and the profile says {size}: another file, or damaged")
-    if hashlib.sha256(content).hexdigest() != sha256.lower():
+    if hashlib.sha256(content).hexdigest() != (sha256 or "").lower():
         raise UserError(f"{path.name} has another SHA-256 than the profile says: another file, or damaged")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:

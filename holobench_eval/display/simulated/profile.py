@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from itertools import accumulate
@@ -110,7 +110,7 @@ class Profile:
     sensor: Sensor = Sensor()
     drift: Drift = Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
-    maps: MapFile | None = None
+    maps: MapFile = MapFile()
     like: str | None = None
     digest: str = field(default="", metadata={"key": False})
 
@@ -235,10 +235,8 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     documents.reverse()  # a fault of a base is told of its own file
     merged = accumulate((each.data for each in documents), _over)
     *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
-    if profile.maps is not None:
-        profile = _with_maps(
-            profile, profile.maps, [each for each in documents if "maps" in each.data][-1], documents[-1]
-        )
+    if profile.maps.file is not None:
+        profile = _with_maps(profile, documents)
     return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
 
 
@@ -267,17 +265,13 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     return profile
 
 
-def _with_maps(profile: Profile, given: MapFile, named: Document, last: Document) -> Profile:
-    """The profile whose stages hold the maps of a file, from the folder of the document that names it."""
-    panel = profile.panel
-    sizes = {
-        "colours": len(panel.wavelengths),
-        "levels": 2**panel.bits,
-        "rows": panel.shape[0],
-        "columns": panel.shape[1],
-    }
+def _with_maps(profile: Profile, documents: Sequence[Document]) -> Profile:
+    """The profile whose stages hold the maps of its file, from the folder of the last document that speaks of it."""
+    panel, named = profile.panel, [each for each in documents if "maps" in each.data][-1]
+    rows, columns = panel.shape
+    sizes = {"colours": len(panel.wavelengths), "levels": 2**panel.bits, "rows": rows, "columns": columns}
     try:
-        loaded = load_maps(given, Path(named.name).parent, sizes)
+        loaded = load_maps(profile.maps, Path(named.name).parent, sizes)
     except UserError as error:
         raise named.error(("maps", "file"), str(error)) from error
     for key, values in loaded.items():
@@ -285,7 +279,7 @@ def _with_maps(profile: Profile, given: MapFile, named: Document, last: Document
         own = getattr(profile, stage)
         profile = replace(profile, **{stage: replace(own, maps={**own.maps, name: values})})
     for where, fault in profile.map_faults():
-        raise last.error(where, fault)
+        raise documents[-1].error(where, fault)
     return profile
 
 

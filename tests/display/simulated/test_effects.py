@@ -42,7 +42,7 @@ def test_no_effect_is_listed_twice_and_a_form_names_only_those_that_some_display
     told = [[one.name for one in load_profile(name).effects()] for name in names()]
     assert all(len(effects) == len(set(effects)) for effects in told)
     everywhere = set().union(*told)
-    assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical"}
+    assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical", "offset"}
 
 
 def test_the_form_of_the_model_is_wrong_for_leto_aged_and_more_so_for_the_dusty_one() -> None:

@@ -240,10 +240,7 @@ def altered(profile: Profile, kind: str, value: Value) -> Profile:
     if KINDS[kind].numeric and value == KINDS[kind].nominal:
         return profile
     changed = KINDS[kind].apply(profile, value)
-    for _, fault in (*changed.plane_faults(), *changed.map_faults()):
+    drawn = [((), "it draws other patterns, and the profile's maps stay")] if changed.seed != profile.seed else []
+    for _, fault in (*changed.plane_faults(), *(drawn if profile.held else []), *changed.map_faults()):
         raise UserError(f"{kind} does not suit '{profile.name}': {fault}")
-    if profile.held and changed.seed != profile.seed:
-        raise UserError(
-            f"{kind} does not suit '{profile.name}': it draws anew what the maps hold, {profile.held[0]} first"
-        )
     return changed

@@ -46,8 +46,8 @@ class Crosstalk(Stage):
         """Its width, and the sub-samples that it acts on."""
         if "width" in self.maps:
             colours = [self.widths(channel) for channel in range(len(profile.panel.wavelengths))]
-            pairs = ", ".join(f"{down:.3g} px along columns and {along:.3g} along rows" for down, along in colours)
-            yield Effect("crosstalk", f"measured crosstalk of {pairs}")
+            widths = ", ".join(f"{down:.3g} x {along:.3g}" for down, along in colours)
+            yield Effect("crosstalk", f"measured crosstalk of {widths} px")
             if any(down != along for down, along in colours):
                 yield Effect("uneven_crosstalk", "crosstalk of another width along rows than along columns")
         if self.width:
