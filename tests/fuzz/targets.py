@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from PIL import Image
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.core.hashing import digest
 from holobench_eval.datasets.images import decode
+from holobench_eval.display.simulated.maps import MapFile, load_maps
 from holobench_eval.display.simulated.profile import load_profile
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.raw import read_raw
@@ -46,6 +48,17 @@ def _file(folder: Path, name: str, content: bytes) -> Path:
     path = folder / name
     path.write_bytes(content)
     return path
+
+
+def _maps() -> list[bytes]:
+    content = io.BytesIO()
+    np.savez(content, **{"lut.gain": np.ones((3, 2, 2), np.float32), "sensor.ambient": np.ones(3, np.float32)})
+    return [content.getvalue()]
+
+
+def _read_maps(content: bytes, folder: Path) -> object:
+    said = MapFile(_file(folder, "maps.npz", content).name, len(content), hashlib.sha256(content).hexdigest())
+    return load_maps(said, folder, {"colours": 3, "levels": 256, "rows": 64, "columns": 64})
 
 
 ARRAYS = (".npy", ".npz")  # the first byte of an input says which of them follows; .mat is read in a process of its own
@@ -169,6 +182,7 @@ TARGETS = {
     "phases": Target(_read_phases, _phases),
     "tensors": Target(lambda content, folder: read_tensors(_file(folder, "learned.pt", content)), _tensors),
     "record": Target(_read_record, _records),
+    "maps": Target(_read_maps, _maps),
     "provenance": Target(
         lambda content, folder: read_provenance(_file(folder, "provenance.json", content).parent),
         lambda: [(ROOT / "reports/focus/provenance.json").read_bytes()[:4000], b'{"earlier": [{}]}'],

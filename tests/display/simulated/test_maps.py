@@ -180,15 +180,14 @@ def packed(given: Mapping[str, Any]) -> bytes:
     return content.getvalue()
 
 
-def written(folder: Path, content: bytes, name: str = "lab.npz", more: str = "", **said: Any) -> Path:
+def written(folder: Path, content: bytes, more: str = "", **said: Any) -> Path:
     """A profile with a file of maps; said: what it says of the file, instead of the truth."""
     panel = {**asdict(load_profile("ideal").scaled(PANEL).panel)}
     panel.pop("maps")
-    about = {"file": name, "size": len(content), "sha256": hashlib.sha256(content).hexdigest(), **said}
+    about = {"file": "lab.npz", "size": len(content), "sha256": hashlib.sha256(content).hexdigest(), **said}
     head = "name: lab\nversion: 1\nseed: 0\ndescription: A display.\nsampling: 3\n"
     (folder / "lab.yaml").write_text(f"{head}panel: {json.dumps(panel)}\nmaps: {json.dumps(about)}\n{more}")
-    if name == "lab.npz":
-        (folder / name).write_bytes(content)
+    (folder / "lab.npz").write_bytes(content)
     return folder / "lab.yaml"
 
 
@@ -243,12 +242,12 @@ def unlike(**given: Any) -> bytes:
     return packed({**arrays(), **{key.replace("__", "."): value for key, value in given.items()}})
 
 
-def promising(shape: str) -> bytes:
+def promising(shape: str, way: int = zipfile.ZIP_STORED) -> bytes:
     """An array whose header promises more than there is."""
     header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}}}\n".encode()
     array = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(12)
     content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
+    with zipfile.ZipFile(content, "w", way) as archive:
         archive.writestr("sensor.ambient.npy", array)
     return content.getvalue()
 
@@ -273,6 +272,8 @@ FLAT = np.ones((3, 5, 6), np.float32)
         (unlike(lut__gian=FLAT), "no display has a map 'lut.gian'; did you mean 'lut.gain'"),
         (unlike(lut__gain=np.zeros((3, 1500, 1500), np.float32)), "its arrays are larger than 20 MB in all"),
         (promising("(3, 99999999999)"), "no npz file of plain arrays"),
+        (promising("(3,)", zipfile.ZIP_LZMA), r"no npz file .*compressed in another way"),
+        (promising("(3,)").replace(b"(3,)", b"(4,)"), "no npz file of plain arrays"),
         (promising("(" * 200), "no npz file of plain arrays"),
     ],
 )
@@ -292,7 +293,8 @@ def test_a_file_that_is_no_file_of_maps_is_one_line(tmp_path: Path, content: byt
         ({"file": "none.npz"}, "", "no such file: .*none.npz$"),
         ({"file": "../lab.npz"}, "", "'../lab.npz' is not a file in the profile's folder"),
         ({"file": "/etc/passwd"}, "", "'/etc/passwd' is not a file in the profile's folder"),
-        ({"file": "link.npz"}, "", "'link.npz' is a link to a file outside the profile's folder"),
+        ({"file": "link.npz"}, "", "'link.npz' is a link that leaves the profile's folder"),
+        ({"file": "circle.npz"}, "", "'circle.npz' is a link that leaves the profile's folder"),
         ({}, "lut: {gamma: [1.2, 1, 1]}\n", "lab.yaml:8:14: lut.gamma has no effect beside the map lut.table$"),
         ({}, "zero_order: {fraction: 0.1}\n", "zero_order.fraction has no effect beside the map zero_order.field$"),
     ],
@@ -304,6 +306,7 @@ def test_a_file_that_is_elsewhere_or_another_one_is_one_line(
     folder.mkdir()
     (tmp_path / "lab.npz").write_bytes(packed(arrays()))
     (folder / "link.npz").symlink_to(tmp_path / "lab.npz")
+    (folder / "circle.npz").symlink_to("circle.npz")
     written(folder, packed(arrays()), more=more, **said)
     with pytest.raises(UserError, match=message) as told:
         load_profile("lab.yaml", folder)
