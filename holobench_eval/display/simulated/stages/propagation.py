@@ -50,9 +50,8 @@ class Propagation(Stage):
         if self.distance_error or self.wavelength_error:
             wavelength = f"{percent(self.wavelength_error)} of the wavelength"
             yield Effect("defocus", f"wrong by {percent(self.distance_error)} of the distance, {wavelength}")
-        for name, radians in zip(
-            NAMES, self.maps["aberration"].T.tolist() if "aberration" in self.maps else [], strict=False
-        ):
+        measured = self.maps["aberration"].T.tolist() if "aberration" in self.maps else []
+        for name, radians in zip(NAMES, measured, strict=False):
             if any(radians) and not self.aberration.get(name):
                 text = ", ".join(f"{value:.3g}" for value in radians)
                 yield Effect(name, f"aberration {name.replace('_', ' ')}, {text} rad rms, as measured")
