@@ -69,6 +69,7 @@ QUICK: dict[str, dict[str, Any]] = {
         key: {**_CALIBRATED, "patterns": 2}
         for key in ("parametric_model", "partially_coherent_model", "learned_kernel")
     },
+    "twin": {**_CALIBRATED, "patterns": 2, "holograms": 4},
     **{key: {**_CALIBRATED, "patterns": 2, "width": 4} for key in ("cnn_prop_cnn", "hybrid_model")},
     **{
         key: {"training": {"steps": 8}, "retrieval": {"iterations": 3}, "start": _EARLY}

@@ -49,7 +49,7 @@ class MapFile:
 
 @dataclass(frozen=True)
 class Map:
-    """What an array is. axes: of it, the first of which is the colour; low, high: of its values; instead: keys of the
+    """What an array is. axes: of it; low, high: of its values; instead: keys of the
     stage that it takes the place of, and which the profile may not give beside it."""
 
     axes: tuple[str, ...]
@@ -61,6 +61,7 @@ class Map:
 
 
 COLOURS, PAIR, OVER = ("colours",), ("colours", "2"), ("colours", "rows", "columns")
+AXES = ("2", "rows", "columns")
 KEYS: Mapping[str, Map] = {
     "lut.table": Map(
         ("colours", "levels"), "rad", -100, 100, "phase of each level", ("gamma", "bend", "table")
@@ -89,6 +90,9 @@ KEYS: Mapping[str, Map] = {
     ),
     "stray_light.share": Map(COLOURS, "share of the light", 0, 1, "that is spread", ("share",)),
     "stray_light.reach": Map(COLOURS, "panel heights", 1e-4, 10, "of what is spread", ("reach",)),
+    "relay.moved": Map(
+        AXES, "px", -20, 20, "displacement of the picture, of rows and of columns, before what `relay` does to it"
+    ),
     "sensor.shading": Map(OVER, "1", 0, 1000, "factor of the light over the image"),
     "sensor.exponent": Map(
         COLOURS, "1", 0.1, 10, "of the response: light of L white pixels is counted as L^exponent of them"
@@ -127,12 +131,12 @@ def load_maps(given: MapFile, folder: Path, sizes: Mapping[str, int]) -> dict[st
         axes = KEYS[key].axes
         wanted = tuple(sizes.get(axis) or (len(NAMES) if axis == "modes" else int(axis)) for axis in axes)
         coarser = (
-            axes == OVER
+            axes in (OVER, AXES)
             and values.ndim == 3
             and all(2 <= n <= most for n, most in zip(values.shape[1:], wanted[1:], strict=True))
         )
         if tuple(values.shape) != wanted and not (coarser and len(values) == wanted[0]):
-            names = f"({', '.join(axes)}), here {wanted}{', or with fewer rows and columns' * (axes == OVER)}"
+            names = f"({', '.join(axes)}), here {wanted}{', or with fewer rows and columns' * (axes in (OVER, AXES))}"
             raise UserError(f"{path.name}: '{key}' has the shape {tuple(values.shape)}; expected {names}")
     return loaded
 

@@ -99,7 +99,8 @@ class SimulatedBench:
         self.drift_gain = profile.drift.phase_gain(geometry)
         pitches = (self.spec.image_pitch, profile.sensor.pitch)
         points = today.relay.panel_points(panel.shape, *pitches, window=self.spec.region.shape)
-        self.grid = sampling_grid(points + torch.tensor(panel.offset), panel.shape).to(device)
+        points = today.relay.displaced(points, panel.shape) + torch.tensor(panel.offset)
+        self.grid = sampling_grid(points, panel.shape).to(device)
         fine = [self.image_samples * size for size in panel.shape]
         self.fine_grid = finer_grid(self.grid, fine, self.image_samples)
         self.response = profile.sensor.response((points.shape[0], points.shape[1]), geometry)
@@ -156,8 +157,7 @@ class SimulatedBench:
         turning = 1.0 if plane is None else 1 - noise.plane_distance
         ends = [(0.0, 1.0)] if plane is None else [(0.0, turning), (turning, 1.0)]
         legs = [profile.propagation.transfer(geometry, padded, profile.panel.pupil, leg) for leg in ends]
-        held, centred = profile.aperture is not None, profile.centred
-        rows, columns = sample_weights(padded, self.samples, geometry.blaze, hold=held, centred=centred)
+        rows, columns = sample_weights(padded, self.samples, geometry.blaze, hold=profile.aperture is not None)
         fy, fx = frequencies(padded, geometry.pitch)
         for factor in present(stage.transmission(fy, fx, geometry) for stage in profile.stages):
             legs[-1] = legs[-1] * factor.to(legs[-1].dtype)

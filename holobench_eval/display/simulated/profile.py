@@ -64,8 +64,6 @@ class Profile:
         The nominal, public part: what methods are told.
     sampling
         Sub-samples a pixel and axis at the panel; crosstalk and fill factor need at least 3 [count].
-    centred
-        Whether the light of all sub-samples leaves from the middle of their pixel, as a model of whole pixels has it.
     lens to drift
         The stages. ``dust_plane`` has no keys of its own: its parameters are in ``coherent_noise``.
     residual_bound
@@ -92,7 +90,6 @@ class Profile:
     description: str
     panel: Panel
     sampling: Annotated[int, Interval(ge=1, le=7)] = 1
-    centred: bool = False
     lens: AddedLens = AddedLens()
     lut: LookUpTable = LookUpTable()
     crosstalk: Crosstalk = Crosstalk()
@@ -144,7 +141,6 @@ class Profile:
         if self.panel.plane == "fresnel":
             return
         for where, given in (
-            (("centred",), self.centred),
             (("propagation", "pupil_shift"), any(self.propagation.pupil_shift)),
             (("propagation", "obstruction"), self.propagation.obstruction > 0),
             (("coherent_noise", "plane_specks"), self.coherent_noise.plane_specks > 0),

@@ -54,7 +54,7 @@ class Crosstalk(Stage):
             yield Effect("crosstalk", f"crosstalk of {self.width:g} px")
             if self.ratio != 1:
                 yield Effect("uneven_crosstalk", f"crosstalk {self.ratio:g} times as wide along rows as along columns")
-        if profile.sampling > 1 and not profile.centred:
+        if profile.sampling > 1:
             grid = f"{profile.sampling} x {profile.sampling}"
             yield Effect("sub_pixel_field", f"structure inside a pixel, {grid} samples, each where it is")
 

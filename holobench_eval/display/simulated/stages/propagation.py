@@ -125,20 +125,19 @@ class Propagation(Stage):
 
 
 def sample_weights(
-    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool, centred: bool = False
+    padded: tuple[int, int], samples: int, blaze: tuple[float, float], hold: bool
 ) -> tuple[Tensor, Tensor]:
     """Weights that add the spectra of the sub-samples to that of the panel, ``(samples, padded)`` for each axis.
 
     Each sub-sample sits off its pixel's centre and, with ``hold``, is a small square (a sinc in frequency). The
     spectra are those of fields whose carrier ``blaze`` [cycles per pixel] has been taken off pixel by pixel, so the
-    light of frequency f left the panel at f + blaze. Centred: all sub-samples send their light from the pixel's centre.
+    light of frequency f left the panel at f + blaze.
     """
     axes = []
     for size, carrier in zip(padded, blaze, strict=True):
         f = torch.fft.fftfreq(size, dtype=torch.float64) + carrier
         envelope = torch.sinc(f / samples) if hold else torch.ones_like(f)
-        turning = torch.full_like(f, carrier) if centred else f
-        angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * turning
+        angle = -2 * math.pi * torch.tensor(sample_positions(samples), dtype=torch.float64)[:, None] * f
         weights = torch.polar(envelope.expand_as(angle).contiguous(), angle) / samples
         axes.append(weights.to(torch.complex64))
     return axes[0], axes[1]

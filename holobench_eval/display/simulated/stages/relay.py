@@ -14,6 +14,7 @@ from torch import Tensor
 
 from ....core.compiled import usable
 from ..kernels import sample_rows
+from ..maps import enlarged
 from ..stage import Effect, Stage
 
 if TYPE_CHECKING:
@@ -40,7 +41,10 @@ class Relay(Stage):
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """The pose."""
-        if self.rotation or any(self.shift) or any(self.perspective) or self.distortion:
+        if "moved" in self.maps:
+            displacement = float(self.maps["moved"].square().sum(0).mean().sqrt())
+            yield Effect("pose", f"picture displaced by {displacement:.2g} px rms, as measured")
+        elif self.rotation or any(self.shift) or any(self.perspective) or self.distortion:
             yield Effect("pose", "pose of the camera, what registration leaves of it and its interpolation")
 
     def frame_shape(self, window: tuple[int, int], pitch: float, sensor_pitch: float) -> tuple[int, int]:
@@ -68,6 +72,15 @@ class Relay(Stage):
         row = y * stretch * shape[0] + (shape[0] - 1) / 2
         column = x * stretch * shape[0] + (shape[1] - 1) / 2
         return torch.stack([row, column], dim=-1)
+
+    def displaced(self, points: Tensor, shape: tuple[int, int]) -> Tensor:
+        """Panel coordinates ``(Hs, Ws, 2)`` [px] where the picture is that was displaced on its way; linear between
+        pixels, of whose displacement a map has rows and columns."""
+        if "moved" not in self.maps:
+            return points
+        moved = torch.stack([enlarged(each, shape) for each in self.maps["moved"]])
+        grid = sampling_grid(points, shape).double()[None]
+        return points + F.grid_sample(moved[None], grid, padding_mode="border", align_corners=True)[0].permute(1, 2, 0)
 
 
 def sampling_grid(points: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -60,12 +60,10 @@ class StrayLight(Stage):
 
 
 def blurred(light: Tensor, widths: Sequence[float], per_pixel: int) -> Tensor:
-    """An image ``(n H, n W)``, n samples a pixel and axis, with each sample the mean of those that lie whole pixels
-    from it, under a Gaussian of standard deviations ``widths`` along columns and rows [px]; flat light stays flat."""
-    rows, columns = (side // per_pixel for side in light.shape)
-    down, along = (_means(side, width, light) for side, width in zip((rows, columns), widths, strict=True))
-    split = light.view(rows, per_pixel, columns, per_pixel)
-    return torch.einsum("ab,bicj,dc->aidj", down, split, along).reshape(light.shape)
+    """An image ``(n H, n W)``, n samples a pixel and axis, under a Gaussian of standard deviations ``widths`` along
+    columns and rows [px]; flat light stays flat."""
+    down, along = (_means(side, per_pixel * width, light) for side, width in zip(light.shape, widths, strict=True))
+    return down @ light @ along.T
 
 
 def _means(side: int, width: float, like: Tensor) -> Tensor:

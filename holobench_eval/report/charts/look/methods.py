@@ -52,6 +52,7 @@ REGISTRY = {
     "parametric_model": (GREEN, "s"),
     "partially_coherent_model": (GREEN, "P"),
     "hybrid_model": (GREEN, "D"),
+    "twin": (GREEN, "*"),
     "learned_kernel": (GREEN, "^"),
     "cnn_prop_cnn": (GREEN, "v"),
     "image_terms": (GREEN, "<"),

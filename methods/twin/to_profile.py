@@ -1,8 +1,7 @@
-"""A model that has learned a display becomes a profile: a YAML file, and maps beside it (``display.simulated.maps``).
+"""A twin becomes a profile: a YAML file, and maps beside it (``display.simulated.maps``).
 
-The profile's stages have the model's equations, which differ from those of a seeded display in two places: the light of
-all sub-samples leaves from the middle of their pixel (``centred``), and the camera has two pixels to one of the panel,
-so that it adds no blur to the one that the captures had already.
+The stages of the profile have the twin's equations. Its camera has two pixels to one of the panel, so that it adds no
+blur to the one that the captures had already.
 """
 
 from __future__ import annotations
@@ -10,8 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -26,21 +23,20 @@ from ...display.simulated.maps import LARGEST
 from ...display.simulated.profile import Profile
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES
-from .display_model import MODES, SAMPLES, SOURCE_GRID, DisplayModel, enlarged
-from .hybrid import FinePanel
-from .terms import Haze, ImageTerms
+from ..calibrated.display_model import MODES, SAMPLES, enlarged
+from .model import TwinCamera, TwinModel
 
-DENSE = 8 * (SOURCE_GRID - 1) + 1  # points along an axis of a smooth map: every knot, and seven between two
+DENSE = 8 * (TwinModel.SOURCE_GRID - 1) + 1  # points along an axis of a map: every knot, and seven between two
 FINEST = 0.5e-6  # m, the smallest pixel of a camera
 
 
-def to_profile(model: DisplayModel, terms: Haze, base: Profile, name: str, folder: Path) -> Path:
-    """Write a model of a display as a profile.
+def to_profile(model: TwinModel, camera: TwinCamera, base: Profile, name: str, folder: Path) -> Path:
+    """Write a twin as a profile.
 
     Parameters
     ----------
-    model, terms
-        As they have learned; of a ``PredictedCapture`` without its network.
+    model, camera
+        As they have learned.
     base
         Gives the nominal panel, which has to be the model's, and of its camera bits, dark level, well, read noise and
         headroom. The camera looks straight at the picture.
@@ -64,7 +60,7 @@ def to_profile(model: DisplayModel, terms: Haze, base: Profile, name: str, folde
     >>> from tempfile import mkdtemp
     >>> from holobench_eval.display import load_profile
     >>> base = load_profile("ideal").scaled((64, 64))
-    >>> path = to_profile(DisplayModel(base.spec()), Haze(base.spec()), base, "lab", Path(mkdtemp()))
+    >>> path = to_profile(TwinModel(base.spec()), TwinCamera(base.spec()), base, "lab", Path(mkdtemp()))
     >>> load_profile(str(path)).held[:2]
     ['lut.table', 'lut.gain']
     """
@@ -73,7 +69,7 @@ def to_profile(model: DisplayModel, terms: Haze, base: Profile, name: str, folde
         raise UserError(f"'{name}': the model is not of the panel of '{base.name}', or of one in a Fourier plane")
     content = io.BytesIO()
     with torch.no_grad():
-        held = {**panel_maps(model), **image_maps(model, terms)}
+        held = {**panel_maps(model), **image_maps(model, camera)}
     arrays: dict[str, Any] = {key: values.detach().cpu().float().numpy() for key, values in held.items()}
     np.savez(content, **arrays)
     packed = content.getvalue()
@@ -83,16 +79,16 @@ def to_profile(model: DisplayModel, terms: Haze, base: Profile, name: str, folde
         )
     stem = file_name(name)
     figures = base.sensor.bits, base.sensor.dark, base.sensor.full_well, base.sensor.read_noise, base.sensor.headroom
-    camera = dict(zip(("bits", "dark", "full_well", "read_noise", "headroom"), figures, strict=True))
+    sensor = dict(zip(("bits", "dark", "full_well", "read_noise", "headroom"), figures, strict=True))
     document = {
         "name": name,
         "version": 1,
         "seed": 0,
-        "description": f"A display as a model learned it from captures, on the panel of {base.name}.",
+        "description": f"The twin of a display, learned from captures, on the panel of {base.name}.",
         "panel": {key: value for key, value in asdict(base.panel).items() if key != "maps"},
         "sampling": SAMPLES,
-        "centred": True,
-        "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **camera},
+        "aperture": {"fill": 1.0},
+        "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **sensor},
         "residual_bound": base.residual_bound,
         "maps": {"file": f"{stem}.npz", "size": len(packed), "sha256": hashlib.sha256(packed).hexdigest()},
     }
@@ -102,59 +98,43 @@ def to_profile(model: DisplayModel, terms: Haze, base: Profile, name: str, folde
     return folder / f"{stem}.yaml"
 
 
-def panel_maps(model: DisplayModel) -> dict[str, Tensor]:
-    """What a model says of the panel and its light, by ``maps.KEYS``."""
+def panel_maps(model: TwinModel) -> dict[str, Tensor]:
+    """What a twin has of the panel and its light, by ``maps.KEYS``."""
     spec, channels = model.spec, len(model.table)
-    rows, columns = spec.shape if isinstance(model, FinePanel) else (min(DENSE, side) for side in spec.shape)
-    gain, amplitude, angle = (enlarged(grid, (rows, columns)) for grid in (model.gain, model.amplitude, model.angle))
-    if isinstance(model, FinePanel):
-        amplitude, angle = amplitude + model.fine[0], angle + model.fine[1]
+    size = (min(DENSE, spec.shape[0]), min(DENSE, spec.shape[1]))
     levels = torch.arange(2**spec.bits, device=model.table.device) * (TAU / 2**spec.bits)
     aberration = model.aberration.new_zeros(channels, len(NAMES))
     aberration[:, [NAMES[mode] - 1 for mode in MODES]] = model.aberration
     return {
         "lut.table": model._driven(levels.expand(channels, 1, -1))[:, 0],
-        "lut.gain": gain.exp(),
+        "lut.gain": enlarged(model.gain, size).exp(),
         "crosstalk.width": model.crosstalk.exp()[:, None].expand(-1, 2),
-        "illumination.amplitude": amplitude.exp(),
-        "illumination.phase": angle,
+        "illumination.amplitude": enlarged(model.amplitude, size).exp(),
+        "illumination.phase": enlarged(model.angle, size),
         "propagation.aberration": aberration,
-        "zero_order.field": model.undiffracted / _within(spec.blaze),
+        "zero_order.field": model.undiffracted,
     }
 
 
-def image_maps(model: DisplayModel, terms: Haze) -> dict[str, Tensor]:
-    """What model and terms say of the image, by ``maps.KEYS``."""
-    shared = {
-        "illumination.power": model.brightness.exp(),
-        "stray_light.share": terms.share.sigmoid(),
-        "stray_light.reach": terms.reach.exp(),
-        "sensor.ambient": terms.offset,
-    }
-    return {**shared, **_more(model, terms)} if isinstance(terms, ImageTerms) else shared
-
-
-def _more(model: DisplayModel, terms: ImageTerms) -> Mapping[str, Tensor]:
-    """Blur, shading and response; the gain behind the response is a power before it."""
-    exponent = terms.gamma.exp()
+def image_maps(model: TwinModel, camera: TwinCamera) -> dict[str, Tensor]:
+    """What a twin has of the image, by ``maps.KEYS``; the gain behind the response is a power before it."""
+    exponent = camera.gamma.exp()
     return {
-        "illumination.power": (model.brightness + terms.gain / exponent).exp(),
-        "stray_light.blur": terms.blur.exp(),
-        "sensor.shading": _shading(model, terms),
+        "illumination.power": (model.brightness + camera.gain / exponent).exp(),
+        "stray_light.share": camera.share.sigmoid(),
+        "stray_light.reach": camera.reach.exp(),
+        "stray_light.blur": camera.blur.exp(),
+        "relay.moved": camera.moved,
+        "sensor.shading": _shading(model, camera),
         "sensor.exponent": exponent,
+        "sensor.ambient": camera.offset,
     }
 
 
-def _shading(model: DisplayModel, terms: ImageTerms) -> Tensor:
+def _shading(model: TwinModel, camera: TwinCamera) -> Tensor:
     """The factor over all of the image, ``(C, H, W)``; around the region that of its edge."""
     region, (height, width) = model.spec.region, model.spec.shape
-    inside = torch.exp(torch.einsum("cm,mhw->chw", terms.shading, terms.monomials))
+    inside = torch.exp(torch.einsum("cm,mhw->chw", camera.shading, camera.monomials))
     rows = (torch.arange(height) - region.top).clamp(0, region.height - 1)
     columns = (torch.arange(width) - region.left).clamp(0, region.width - 1)
     return inside[:, rows][:, :, columns]
-
-
-def _within(cycles: tuple[float, float]) -> float:
-    """Share of unmodulated light that a pixel's sub-samples send along a blaze; the model does not lessen it so."""
-    places = [(j - (SAMPLES - 1) / 2) / SAMPLES for j in range(SAMPLES)]
-    return math.prod(sum(math.cos(TAU * each * place) for place in places) / SAMPLES for each in cycles)

@@ -1,0 +1,69 @@
+"""The twin of a display, learned from captures: a calibrated method, and by ``to_profile`` a display."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from annotated_types import Interval
+
+from ...display.api import DisplaySpec
+from ...display.training import TrainingBench
+from ..calibrated.approximator import ModelApproximator, Rates
+from ..calibrated.method import ShortSchedule, ThroughModel
+from ..calibrated.patterns import pattern_samples
+from ..double_phase import DoublePhase
+from ..gerchberg_saxton import GerchbergSaxton
+from ..learned.samples import Sample, Steps, captured
+from ..sgd import AmplitudeSGD
+from ..wirtinger import Wirtinger
+from .model import TwinCamera, TwinModel
+
+OPEN_LOOP = (Wirtinger(), DoublePhase(), AmplitudeSGD(), GerchbergSaxton())
+
+
+@dataclass(frozen=True)
+class TwinSchedule(ShortSchedule):
+    """First what other methods make, then what the twin itself makes, whose errors it has to know."""
+
+    images: Annotated[int, Interval(ge=1)] | None = 8
+    refine_images: Annotated[int, Interval(ge=1)] | None = 8
+    steps: Steps = 1200
+    refine_steps: Steps = 600
+
+
+@dataclass(frozen=True)
+class Twin(ThroughModel):
+    """A physical model with the levels, the sub-samples and the camera of the display, learned from captures.
+
+    It learns from patterns that visit every level and frequency, from dark ones that tell haze from tone, from
+    holograms of four methods, which a lab will compare on it, and from its own. SI units throughout.
+
+    Parameters
+    ----------
+    patterns : int
+        Speckle-like patterns.
+    holograms : int
+        Holograms of training images, by Wirtinger holography, double phase, SGD and Gerchberg-Saxton in turn.
+    """
+
+    training: TwinSchedule = TwinSchedule()
+    patterns: Annotated[int, Interval(ge=0, le=1000)] = 12
+    holograms: Annotated[int, Interval(ge=0, le=10_000)] = 24
+
+    title: ClassVar[str] = "a twin of the display"
+    RATES: ClassVar[Rates] = Rates(model=3e-2, terms=1e-2)
+    version: ClassVar[int] = 1
+
+    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
+        """A display that is as the nominal model says, but for a little crosstalk."""
+        return ModelApproximator(TwinModel(spec), None, self.RATES, TwinCamera(spec))
+
+    def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        numbers = range(self.holograms)
+        images = [bench.images[number % len(bench.images)] for number in numbers]
+        methods = [OPEN_LOOP[number % len(OPEN_LOOP)] for number in numbers]
+        phases = [bench.solved(method, image) for method, image in zip(methods, images, strict=True)]
+        shown = captured(bench, [f"hologram {number}" for number in numbers], phases, images, "hologram")
+        return [*pattern_samples(bench, self.patterns), *shown]
