@@ -45,7 +45,8 @@ class Twin(ThroughModel):
     patterns : int
         Speckle-like patterns.
     holograms : int
-        Holograms of training images, by Wirtinger holography, double phase, SGD and Gerchberg-Saxton in turn.
+        Holograms of training images, by Wirtinger holography, double phase, descent on
+        amplitude and Gerchberg-Saxton in turn.
     """
 
     training: TwinSchedule = TwinSchedule()
