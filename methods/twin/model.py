@@ -87,6 +87,8 @@ class TwinCamera(ImageTerms):
     moved: displacement of the picture [px], rows and columns, ``(2, n, n)``, for all colours.
     """
 
+    places: Tensor
+
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__(spec)
         self.moved = nn.Parameter(torch.zeros(2, POSE_GRID, POSE_GRID))
@@ -104,7 +106,8 @@ class TwinCamera(ImageTerms):
 
     def _seen(self, image: Tensor) -> Tensor:
         """An image ``(C, 2 H, 2 W)`` at the displaced pixels, ``(C, H, W)``."""
-        at = (self.places + enlarged(self.moved, self.places.shape[-2:])) * FINER
+        _, height, width = self.places.shape
+        at = (self.places + enlarged(self.moved, (height, width))) * FINER
         ends = at.new_tensor([side - 1 for side in image.shape[-2:]])[:, None, None]
         grid = (2 * at / ends - 1).flip(0).permute(1, 2, 0).expand(len(image), -1, -1, -1)
         return functional.grid_sample(image[:, None], grid, "bilinear", "border", align_corners=True)[:, 0]
