@@ -169,20 +169,25 @@ def lit(phase: Tensor, taps: Tensor, cycles: tuple[float, float] = (0.0, 0.0)) -
     taps: share of each neighbouring pixel in each sub-sample, ``(C, samples, 2 reach + 1)``, along one axis; cycles:
     the blaze, (vertical, horizontal) cycles a pixel.
     """
-    channels = len(phase)
     within = blaze((SAMPLES, SAMPLES), (cycles[0] / SAMPLES, cycles[1] / SAMPLES)).to(phase)
     within = (within - within[SAMPLES // 2, SAMPLES // 2]).reshape(-1, 1, 1)
-    padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
     if not is_recorded(phase.device) and not taps.requires_grad:  # half the time of what follows
+        padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
         pairs = zip(padded[0], taps.tolist(), strict=True)
         blurred = (correlate_each(correlate_each(colour, own, -2), own, -1).flatten(0, 1) for colour, own in pairs)
         turned = (colour - within for colour in blurred) if any(cycles) else blurred
         return torch.stack([mean_phasor(colour, 0) for colour in turned])
+    return mean_phasor(sub_samples(phase, taps).transpose(0, 1).flatten(1, 2) - within, 1)
+
+
+def sub_samples(phase: Tensor, taps: Tensor) -> Tensor:
+    """The phase ``(C, H, W)`` at sub-samples, ``(samples, C, samples, H, W)``, rows first; taps: as in ``lit``."""
+    channels = len(phase)
+    padded = functional.pad(phase[None], (REACH,) * 4, mode="replicate")
     rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
     rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)  # colours side by side again
     columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
-    columns = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
-    return mean_phasor(columns.transpose(0, 1).flatten(1, 2) - within, 1)
+    return columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
 
 
 def enlarged(grid: Tensor, shape: tuple[int, int]) -> Tensor:

@@ -85,7 +85,10 @@ class ImageTerms(Haze):
         """See the base."""
         widths = self.blur.exp()
         rows, columns = (spread(side, widths[:, axis], True) for axis, side in enumerate(intensity.shape[-2:]))
-        light = self._hazy(rows @ intensity @ columns.mT, intensity)
+        return self._counted(self._hazy(rows @ intensity @ columns.mT, intensity))
+
+    def _counted(self, light: Tensor) -> Tensor:
+        """Shading and tone of the light ``(C, h, w)`` of the region, and the offset."""
         shading = torch.exp(torch.einsum("cm,mhw->chw", self.shading, self.monomials))
         gain, gamma = (value.exp()[:, None, None] for value in (self.gain, self.gamma))
         return gain * (shading * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]

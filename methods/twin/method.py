@@ -11,6 +11,7 @@ from annotated_types import Interval
 from ...display.api import DisplaySpec
 from ...display.training import TrainingBench
 from ..calibrated.approximator import ModelApproximator, Rates
+from ..calibrated.display_model import FORM
 from ..calibrated.method import ShortSchedule, ThroughModel
 from ..calibrated.patterns import pattern_samples
 from ..double_phase import DoublePhase
@@ -56,6 +57,10 @@ class Twin(ThroughModel):
     title: ClassVar[str] = "a twin of the display"
     RATES: ClassVar[Rates] = Rates(model=3e-2, terms=1e-2)
     version: ClassVar[int] = 1
+    form: ClassVar[frozenset[str]] = FORM | {
+        *("quantisation", "sub_pixel_field", "pose", "sensor_area", "blur", "response"),
+        *("vignetting", "sensor_response", "shading"),
+    }
 
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display that is as the nominal model says, but for a little crosstalk."""

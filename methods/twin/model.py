@@ -1,6 +1,6 @@
 """A display as a twin has it: ``DisplayModel`` with levels, sub-samples where they are, and a camera.
 
-On ``leto-2020`` at 144 px, held-out holograms are predicted within 1.4 to 2.4 dB of the noise of a capture; by
+On ``leto-2020`` at 144 px, held-out holograms are predicted within 1.2 to 2.1 dB of the noise of a capture; by
 ``DisplayModel`` within 4.9 to 5.8 dB. A hologram wraps where its phase rounds to 2 pi: without levels the wrap is a
 pixel beside its place at one pixel in 600, which costs 1.6 to 5 dB, double phases most.
 """
@@ -20,8 +20,8 @@ from ...display.simulated.stages.panel import straight_through_level
 from ...display.simulated.stages.propagation import sample_weights
 from ...optics.phase import TAU
 from ...optics.phasor import phasor, squared_modulus
-from ..calibrated.display_model import REACH, SAMPLES, DisplayModel, Maps, enlarged
-from ..calibrated.terms import DARK, ImageTerms, spread
+from ..calibrated.display_model import SAMPLES, DisplayModel, Maps, enlarged, sub_samples
+from ..calibrated.terms import ImageTerms, spread
 
 FINER = 2  # samples of the image, a pixel and axis, at which its intensity is not undersampled
 WINDOW = 5.0  # px, standard deviation of the window of the interpolation
@@ -67,12 +67,7 @@ class TwinModel(DisplayModel):
 
     def _panel(self, shown: Tensor, taps: Tensor) -> Tensor:
         """Field ``(C, H, W)`` of pixels that have the spectrum of all sub-samples of the phase that they show."""
-        channels = len(shown)
-        padded = functional.pad(shown[None], (REACH,) * 4, mode="replicate")
-        rows = functional.conv2d(padded, taps.reshape(channels * SAMPLES, 1, -1, 1), groups=channels)
-        rows = rows.view(channels, SAMPLES, *rows.shape[-2:]).transpose(0, 1)
-        columns = functional.conv2d(rows, taps.reshape(channels * SAMPLES, 1, 1, -1), groups=channels)
-        phases = columns.view(SAMPLES, channels, SAMPLES, *columns.shape[-2:])
+        phases = sub_samples(shown, taps)
         field = phasor(phases.new_ones(()), phases)
         field = field + torch.view_as_complex(self.undiffracted)[:, None, None, None]
         if self.ramp is not None:  # the optical axis follows the blaze
@@ -99,10 +94,7 @@ class TwinCamera(ImageTerms):
         """Intensity ``(C, 2 H, 2 W)``, 1 at a white pixel, to the capture ``(C, h, w)`` of the region."""
         widths = self.blur.exp() * FINER
         rows, columns = (spread(side, widths[:, axis], True) for axis, side in enumerate(intensity.shape[-2:]))
-        light = self._hazy(self._seen(rows @ intensity @ columns.mT), intensity[:, ::FINER, ::FINER])
-        shading = torch.exp(torch.einsum("cm,mhw->chw", self.shading, self.monomials))
-        gain, gamma = (value.exp()[:, None, None] for value in (self.gain, self.gamma))
-        return gain * (shading * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]
+        return self._counted(self._hazy(self._seen(rows @ intensity @ columns.mT), intensity[:, ::FINER, ::FINER]))
 
     def _seen(self, image: Tensor) -> Tensor:
         """An image ``(C, 2 H, 2 W)`` at the displaced pixels, ``(C, H, W)``."""

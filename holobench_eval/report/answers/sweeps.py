@@ -25,7 +25,10 @@ def verdicts(results: Results) -> Iterator[str]:
     displays = list(dict.fromkeys(sweep.swept.before for sweep in found))
     for before in displays:
         here = [sweep for sweep in found if sweep.swept.before == before]
-        named, parts = f"{before}: " * (len(displays) > 1), [*_ranges(here), *_recovered(results, here)]
+        named, parts = (
+            f"{before}: " * (len(displays) > 1),
+            [*_seen(here)] or [*_ranges(here), *_recovered(results, here)],
+        )
         if parts:
             yield f"{named}{'; '.join(parts)}."
             continue
@@ -65,6 +68,20 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
         least = min(gains, key=lambda gain: gain.mean, default=lead)
         ends = "stays" if least.mean > 0 else "is lost"
         yield f"{cost}; its lead over {baseline} {ends}, {score.with_unit(least.mean, signed=True)} at least"
+
+
+def _seen(here: list[Sweep]) -> Iterator[str]:
+    """The best method for an eye whose pupil is at each place, and what it gains there over the baseline."""
+    for sweep in (sweep for sweep in here if sweep.swept.kind == "eye_pupil"):
+        score, baseline, parts = sweep.results.headline, sweep.results.layout.baseline, list[str]()
+        for place, name in sweep.swept.points:
+            rivals = [label for label in sweep.methods if label != baseline]
+            gains = {label: gain for label in rivals if (gain := sweep.gain(label, name)) is not None}
+            if gains:
+                best = max(gains, key=lambda label: gains[label].mean)
+                parts.append(f"{place} {best} {difference(score, gains[best])}")
+        if parts:
+            yield f"best for an eye against {baseline}, by place of its pupil in radii of the iris: {', '.join(parts)}"
 
 
 def _ranges(here: list[Sweep]) -> Iterator[str]:
