@@ -41,6 +41,7 @@ COMMANDS = {
         "doctor",
         "score",
         "session",
+        "twin",
     ),
     "Your own methods and displays, and this program": (
         "new_method",

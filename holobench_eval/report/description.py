@@ -117,6 +117,8 @@ def simulated(
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated, with parameters that are assumed or from data sheets and measured on no panel"
+    if profile.twin.of:
+        return f"simulated, {profile.twin.words}"
     if profile.held:
         return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from annotated_types import Interval
 
@@ -17,11 +17,21 @@ from ..calibrated.patterns import pattern_samples
 from ..double_phase import DoublePhase
 from ..gerchberg_saxton import GerchbergSaxton
 from ..learned.samples import Sample, Steps, captured
+from ..learned.weights import refuse_other_weights
 from ..sgd import AmplitudeSGD
 from ..wirtinger import Wirtinger
 from .model import TwinCamera, TwinModel
 
 OPEN_LOOP = (Wirtinger(), DoublePhase(), AmplitudeSGD(), GerchbergSaxton())
+
+
+def learned_twin(learned: Mapping[str, Any], spec: DisplaySpec) -> tuple[TwinModel, TwinCamera]:
+    """Model and camera as `Twin` has learned them. UserError for what another method has learned."""
+    twin = TwinModel(spec), TwinCamera(spec)
+    with refuse_other_weights():
+        for module, name in zip(twin, ("model", "terms"), strict=True):
+            module.load_state_dict(learned[name])
+    return twin
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ DENSE = 8 * (TwinModel.SOURCE_GRID - 1) + 1  # points along an axis of a map: ev
 FINEST = 0.5e-6  # m, the smallest pixel of a camera
 
 
-def to_profile(model: TwinModel, camera: TwinCamera, base: Profile, name: str, folder: Path) -> Path:
+def to_profile(model: TwinModel, camera: TwinCamera, base: Profile, folder: Path) -> Path:
     """Write a twin as a profile.
 
     Parameters
@@ -38,12 +39,10 @@ def to_profile(model: TwinModel, camera: TwinCamera, base: Profile, name: str, f
     model, camera
         As they have learned.
     base
-        Gives the nominal panel, which has to be the model's, and of its camera bits, dark level, well, read noise and
-        headroom. The camera looks straight at the picture.
-    name
-        Of the display; the files are ``name.yaml`` and ``name.npz``.
+        Gives the name, the nominal panel, which has to be the model's, what is known of the twin, and of its camera
+        bits, dark level, well, read noise and headroom. The camera looks straight at the picture.
     folder
-        Where they are written; it is created where there is none.
+        Where the files are written, ``NAME.yaml`` and ``NAME.npz``; it is created where there is none.
 
     Returns
     -------
@@ -59,38 +58,41 @@ def to_profile(model: TwinModel, camera: TwinCamera, base: Profile, name: str, f
     --------
     >>> from tempfile import mkdtemp
     >>> from holobench_eval.display import load_profile
-    >>> base = load_profile("ideal").scaled((64, 64))
-    >>> path = to_profile(TwinModel(base.spec()), TwinCamera(base.spec()), base, "lab", Path(mkdtemp()))
+    >>> base = replace(load_profile("ideal").scaled((64, 64)), name="lab")
+    >>> path = to_profile(TwinModel(base.spec()), TwinCamera(base.spec()), base, Path(mkdtemp()))
     >>> load_profile(str(path)).held[:2]
     ['lut.table', 'lut.gain']
     """
     base, spec = base.scaled(model.spec.shape), model.spec
     if replace(base.spec(), name=spec.name) != spec or spec.plane == "fourier":
-        raise UserError(f"'{name}': the model is not of the panel of '{base.name}', or of one in a Fourier plane")
-    content = io.BytesIO()
+        raise UserError(f"'{base.name}': the model is not of this panel, or of one in a Fourier plane")
     with torch.no_grad():
-        held = {**panel_maps(model), **image_maps(model, camera)}
+        return write_profile({**panel_maps(model), **image_maps(model, camera)}, base, folder)
+
+
+def write_profile(held: Mapping[str, Tensor], base: Profile, folder: Path) -> Path:
+    """Write a profile of maps, by ``maps.KEYS``, and of a nominal panel and a camera; see ``to_profile``."""
+    content, stem = io.BytesIO(), file_name(base.name)
     arrays: dict[str, Any] = {key: values.detach().cpu().float().numpy() for key, values in held.items()}
     np.savez(content, **arrays)
     packed = content.getvalue()
     if len(packed) > LARGEST:
         raise UserError(
-            f"'{name}': maps of {len(packed) / 1e6:.0f} MB; at most {LARGEST / 1e6:g} MB, as of a smaller panel"
+            f"'{base.name}': maps of {len(packed) / 1e6:.0f} MB; at most {LARGEST / 1e6:g} MB, as of a smaller panel"
         )
-    stem = file_name(name)
-    figures = base.sensor.bits, base.sensor.dark, base.sensor.full_well, base.sensor.read_noise, base.sensor.headroom
-    sensor = dict(zip(("bits", "dark", "full_well", "read_noise", "headroom"), figures, strict=True))
+    sensor = {key: getattr(base.sensor, key) for key in ("bits", "dark", "full_well", "read_noise", "headroom")}
     document = {
-        "name": name,
-        "version": 1,
+        "name": base.name,
+        "version": base.version,
         "seed": 0,
-        "description": f"The twin of a display, learned from captures, on the panel of {base.name}.",
+        "description": base.description,
         "panel": {key: value for key, value in asdict(base.panel).items() if key != "maps"},
         "sampling": SAMPLES,
         "aperture": {"fill": 1.0},
         "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **sensor},
         "residual_bound": base.residual_bound,
         "maps": {"file": f"{stem}.npz", "size": len(packed), "sha256": hashlib.sha256(packed).hexdigest()},
+        **({"twin": asdict(base.twin)} if base.twin.of else {}),
     }
     lines = "".join(f"{key}: {json.dumps(value)}\n" for key, value in document.items())
     write_atomically(folder / f"{stem}.npz", packed)

@@ -38,6 +38,7 @@ from .stages import (
     StrayLight,
     ZeroOrder,
 )
+from .trust import Trust
 
 PROFILES = Path(str(files(__package__) / "profiles"))
 FAMILY = PROFILES / "family"
@@ -70,6 +71,8 @@ class Profile:
         Largest registration residual with which a study may run [region px, rms].
     maps
         A file of measured maps, which act in the place of what stages draw.
+    twin
+        Of a profile that was learned from photographs of a display: how far it can stand for that.
     like
         A profile, by name or file (from the folder of this one), whose values hold where this file gives none.
     digest
@@ -108,6 +111,7 @@ class Profile:
     drift: Drift = Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
     maps: MapFile = MapFile()
+    twin: Trust = Trust()
     like: str | None = None
     digest: str = field(default="", metadata={"key": False})
 

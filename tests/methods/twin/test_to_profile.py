@@ -44,6 +44,10 @@ def base(pupil: float | None, blaze: tuple[float, float]) -> Profile:
     return replace(profile, panel=replace(profile.panel, pupil=pupil, blaze=blaze, region=0.8))
 
 
+def named(profile: Profile, name: str) -> Profile:
+    return replace(profile, name=name)
+
+
 @torch.no_grad()
 def both(model: TwinModel, camera: TwinCamera, path: Path, phase: Tensor) -> tuple[Tensor, Tensor]:
     """Prediction of the model and light on the camera of the display, in the region and the unit of a white pixel."""
@@ -72,12 +76,12 @@ def test_the_display_agrees_with_the_twin_within_three_percent_of_the_light(
 ) -> None:
     display = base(pupil, blaze)
     model, camera = learned(TwinModel(display.spec())), learned(TwinCamera(display.spec()))
-    path = to_profile(model, camera, display, "lab", tmp_path)
+    path = to_profile(model, camera, named(display, "lab"), tmp_path)
     predicted, shown = both(model, camera, path, smooth())
     assert float((shown - predicted).norm() / predicted.norm()) < 0.03
     with torch.no_grad():  # without the circle of the discrete transform, patterns of the finest grain agree too
         model.aberration.zero_()
-    predicted, shown = both(model, camera, to_profile(model, camera, display, "flat", tmp_path), speckle())
+    predicted, shown = both(model, camera, to_profile(model, camera, named(display, "flat"), tmp_path), speckle())
     assert float((shown - predicted).norm() / predicted.norm()) < 0.03
 
 
@@ -86,14 +90,14 @@ def test_each_part_of_a_twin_reaches_the_display(tmp_path: Path) -> None:
     model, camera = learned(TwinModel(display.spec())), learned(TwinCamera(display.spec()))
     with torch.no_grad():
         model.aberration.zero_()
-    whole, before = both(model, camera, to_profile(model, camera, display, "lab", tmp_path), smooth())
+    whole, before = both(model, camera, to_profile(model, camera, named(display, "lab"), tmp_path), smooth())
     draw = torch.Generator().manual_seed(6)
     for module in (model, camera):
         for name, parameter in module.named_parameters():
             kept = parameter.detach().clone()
             with torch.no_grad():
                 parameter += 3 * AWAY.get(name, 0.1) * torch.randn(parameter.shape, generator=draw)
-            predicted, shown = both(model, camera, to_profile(model, camera, display, "lab", tmp_path), smooth())
+            predicted, shown = both(model, camera, to_profile(model, camera, named(display, "lab"), tmp_path), smooth())
             apart = predicted - whole
             assert (shown - before - apart).norm() < 0.3 * apart.norm(), name
             with torch.no_grad():
@@ -103,12 +107,12 @@ def test_each_part_of_a_twin_reaches_the_display(tmp_path: Path) -> None:
 def test_a_display_made_of_an_untrained_twin_has_its_panel(tmp_path: Path) -> None:
     display = base(0.8, (0.0, 0.0))
     untrained = TwinModel(display.spec()), TwinCamera(display.spec())
-    profile = load_profile(str(to_profile(*untrained, display, "lab", tmp_path)))
+    profile = load_profile(str(to_profile(*untrained, named(display, "lab"), tmp_path)))
     assert replace(profile.spec(), name="ideal") == display.spec()
     assert "sensor_area" not in {effect.name for effect in profile.effects()}
 
 
 def test_a_twin_of_another_panel_is_refused(tmp_path: Path) -> None:
     spec = base(0.8, (0.0, 0.0)).spec()
-    with pytest.raises(UserError, match=r"^'lab': the model is not of the panel of 'ideal'"):
-        to_profile(TwinModel(spec), TwinCamera(spec), base(0.7, (0.0, 0.0)), "lab", tmp_path)
+    with pytest.raises(UserError, match="^'lab': the model is not of this panel"):
+        to_profile(TwinModel(spec), TwinCamera(spec), named(base(0.7, (0.0, 0.0)), "lab"), tmp_path)

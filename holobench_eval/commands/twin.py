@@ -1,0 +1,81 @@
+"""``holoeval twin``: photographs of a display become a profile that anyone can run, and a report on its limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..core.errors import UserError
+from .options import ARTIFACTS, PANEL, RETRAIN, Learned
+
+if TYPE_CHECKING:
+    from ..study.calibration.twin import Photographed
+
+NAME = "a-z, A-Z, 0-9, . - and _"
+
+
+def twin(
+    display: Annotated[
+        str, typer.Argument(help="A display profile, the file of a bench, or the folder of a finished session.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the twin, which is named like it.")],
+    panel: Annotated[tuple[int, int], PANEL] = (256, 256),
+    pictures: Annotated[int, typer.Option(min=3, max=11, help="Photographs of so many pictures try the twin.")] = 8,
+    artifacts: Learned = ARTIFACTS,
+    retrain: Annotated[bool, RETRAIN] = False,
+) -> None:
+    """Learn the twin of a display from photographs: a profile with maps, tried on pictures that it has not seen.
+
+    It takes about 60 photographs to learn from, and ten of each picture to be tried on. A stopped one goes on with the
+    same command.
+    """
+    from ..core.io import file_name
+    from ..report.data.twin import tried
+    from ..report.twin import answer, write_twin
+    from ..study.calibration import twin as twins
+    from ..study.calibration.twin import TRIAL
+
+    name = output.resolve().name
+    if file_name(name) != name:
+        raise UserError(f"{output}: the folder names the display; expected {NAME}")
+    source = _photographs(display, output, panel, pictures, artifacts, retrain)
+    print(f"{output}: the twin is written and tried")
+    profile = twins.write_trial(source, name, output)
+    _run(output, TRIAL, artifacts, retrain=False)
+    trial = twins.in_folder(output, artifacts, TRIAL)
+    found = tried(source, trial, name)
+    path = twins.publish(replace(profile, twin=found.trust()), output)
+    report = write_twin(output, source, trial, found, path)
+    for sentence in answer(found):
+        print(f"- {sentence}")
+    print(f"{path}\n{report}")
+
+
+def _photographs(
+    display: str, output: Path, panel: tuple[int, int], pictures: int, artifacts: Path, retrain: bool
+) -> Photographed:
+    """The photographs of a session, or those that are taken now."""
+    from ..core.io import write_atomically
+    from ..lab.session.manifest import FILE as MANIFEST
+    from ..study.calibration import twin as twins
+    from ..study.calibration.twin import PHOTOGRAPHS
+
+    if Path(display).is_dir():
+        if not (Path(display) / MANIFEST).is_file():
+            raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display")
+        return twins.of_session(Path(display))
+    text, config = twins.study_text(display, panel, pictures), output / f"{PHOTOGRAPHS}.yaml"
+    if config.is_file() and config.read_text(encoding="utf-8") != text:
+        raise UserError(f"{output}: holds the twin of another display or of other settings; choose another --output")
+    write_atomically(config, text.encode())
+    _run(output, PHOTOGRAPHS, artifacts, retrain)
+    return twins.in_folder(output, artifacts)
+
+
+def _run(folder: Path, study: str, artifacts: Path, retrain: bool) -> None:
+    from .run import run
+
+    run(folder / f"{study}.yaml", output=folder / study, artifacts=artifacts, retrain=retrain)

@@ -1,0 +1,163 @@
+"""How a twin compares with its display: the same holograms photographed on one and captured on the other."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.stats import kendalltau
+from torch import Tensor
+
+from ...display.simulated.trust import Trust
+from ...metrics import match
+from ...study.calibration.twin import Photographed, trial_names
+from .statistics import Estimate, mean_interval
+
+DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Holograms of a method on one display: scores ``(pictures,)`` [dB], and how much further captures there are from a
+    photograph than a second photograph is, ``(pictures, 1 + colours)`` [dB], all colours first."""
+
+    scores: NDArray[np.float64]
+    gaps: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Score of one method less that of another on the display and on its twin, means over pictures [dB]."""
+
+    first: str
+    second: str
+    display: Estimate
+    twin: Estimate
+
+    @property
+    def apart(self) -> float:
+        """How far the twin is off."""
+        return abs(self.twin.mean - self.display.mean)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A twin that was tried.
+
+    label: of the method whose holograms were made through it; pictures: by name; display: scores on the display
+    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin.
+    """
+
+    name: str
+    of: str
+    label: str
+    photographs: int
+    pictures: tuple[str, ...]
+    display: Mapping[str, NDArray[np.float64]]
+    twins: Mapping[str, Mapping[str, Shown]]
+
+    @property
+    def twin(self) -> Mapping[str, Shown]:
+        """The twin, by method."""
+        return self.twins[self.name]
+
+    def difference(self, label: str, name: str = "") -> Estimate:
+        """Score on a display of the trial less score on the display; of the twin's own holograms: its flattery."""
+        return mean_interval(self.twins[name or self.name][label].scores - self.display[label])
+
+    def pairs(self, name: str = "") -> list[Pair]:
+        """Every pair of methods, on the display and on one of the trial."""
+        shown = self.twins[name or self.name]
+        return [
+            Pair(
+                first,
+                second,
+                mean_interval(self.display[first] - self.display[second]),
+                mean_interval(shown[first].scores - shown[second].scores),
+            )
+            for first, second in itertools.combinations(self.display, 2)
+        ]
+
+    def worst(self, name: str = "", learned: bool = False) -> Pair:
+        """The pair that a display of the trial has furthest off, of methods without a camera; or with one that has."""
+        return max(
+            (pair for pair in self.pairs(name) if (self.label in (pair.first, pair.second)) == learned),
+            key=lambda pair: pair.apart,
+        )
+
+    def tau(self, name: str = "") -> float:
+        """Kendall's tau between the orders of methods by their means."""
+        means = [
+            [float(np.mean(self.display[label])) for label in self.display],
+            [float(np.mean(self.twins[name or self.name][label].scores)) for label in self.display],
+        ]
+        return float(kendalltau(*means).statistic)
+
+    def trust(self) -> Trust:
+        """What stands in the profile."""
+        flattery = self.difference(self.label)
+        gap = {label: round(float(shown.gaps[:, 0].mean()), 2) for label, shown in self.twin.items()}
+        error = round((flattery.high - flattery.low) / 2, 2)
+        return Trust(self.of, self.photographs, len(self.pictures), gap, round(flattery.mean, 2), error)
+
+
+def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
+    """Compare the photographs of a display with the captures of its twin. UserError: a cell of either is missing."""
+    (cells,) = photographed.cells().values()
+    pictures = tuple(dict.fromkeys(item for _, item in cells))
+    labels = tuple(dict.fromkeys(label for label, _ in cells))
+    targets = {item: photographed.target(item) for item in pictures}
+    display: dict[str, NDArray[np.float64]] = {}
+    twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name)}
+    on_twins = trial.cells()
+    noise = {
+        item: Noise.of([photographed.pair(*key) for key in photographed.twice if key[1] == item]) for item in pictures
+    }
+    for label in labels:
+        own = {item: [photographed.captures(cell) for cell in cells[label, item]] for item in pictures}
+        display[label] = np.array([np.mean([score for _, score in shots]) for shots in own.values()])
+        for each, shown in twins.items():
+            others = {item: trial.captures(on_twins[each][label, item][0]) for item in pictures}
+            gaps = [further(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures]
+            shown[label] = Shown(np.array([score for _, score in others.values()]), torch.stack(gaps).numpy())
+    learned = photographed.learned.provenance["captures"]
+    return Trial(name, photographed.display.name, photographed.label, learned, pictures, display, twins)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variance of a photograph, ``a + b I + c I^2`` of its light I: read noise, shot noise and flicker, by colour.
+
+    coefficients: a, b and c, ``(C, 3)``, of all photographs of one exposure.
+    """
+
+    coefficients: Tensor
+
+    @classmethod
+    def of(cls, pairs: Sequence[Sequence[Tensor]]) -> Noise:
+        """Of pairs of photographs ``(C, h, w)`` of one hologram each, by least squares over all pixels."""
+        light = torch.stack([(first + second) / 2 for first, second in pairs]).double().transpose(0, 1).flatten(1)
+        squares = torch.stack([(first - second).square() / 2 for first, second in pairs]).double()
+        powers = torch.stack([light**power for power in range(3)], -1)
+        found = torch.linalg.lstsq(powers, squares.transpose(0, 1).flatten(1)[..., None]).solution
+        return cls(found[..., 0])
+
+    def __call__(self, photograph: Tensor) -> Tensor:
+        """Mean variance of a photograph ``(C, h, w)``, ``(C,)``."""
+        light = photograph.double().flatten(1)
+        means = torch.stack([(light**power).mean(1) for power in range(3)], -1)
+        return (self.coefficients * means).sum(1).clamp_min(0)
+
+
+def further(photograph: Tensor, capture: Tensor, target: Tensor, noise: Noise) -> Tensor:
+    """How much further a capture ``(C, h, w)`` is from a photograph than a second photograph would be, ``(1 + C,)``
+    [dB], all colours first. The photograph is matched to the target, and the capture to the photograph."""
+    first, factors = match(photograph, target)
+    second = (2 * noise(photograph) * factors.double().square()).clamp_min(DARKEST)
+    other = (match(capture, first)[0] - first).double().square().mean((-2, -1)).clamp_min(DARKEST)
+    ratios = torch.cat([(other.mean() / second.mean())[None], other / second])
+    return 10 * ratios.log10()

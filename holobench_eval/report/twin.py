@@ -1,0 +1,130 @@
+"""The report of a twin: how far it can stand for its display."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from ..core.io import write_atomically
+from ..display.simulated.trust import MOST
+from ..metrics import match
+from ..study.calibration.twin import Photographed
+from .charts.look.methods import looks
+from .charts.twin import draw_twin_pictures, draw_twin_scores
+from .data.statistics import Estimate
+from .data.twin import Pair, Trial
+from .markdown import Markdown, blocks, bullets, code, heading, table
+
+COLOURS = ("red", "green", "blue")
+PICTURES, SCORES = "pictures.jpg", "scores.png"
+
+
+def write_twin(folder: Path, photographed: Photographed, trial: Photographed, found: Trial, profile: Path) -> Path:
+    """Write ``report.md`` and its pictures; returns the path of the former."""
+    _draw(folder, photographed, trial, found)
+    path = folder / "report.md"
+    text = blocks(
+        [
+            heading(f"{found.name}: the twin of {found.of}", 1),
+            bullets(answer(found)),
+            Markdown("![A picture on the display and on its twin]({})").format(Markdown(PICTURES)),
+            "The first picture, matched to its target; differences in linear light, without their sign.",
+            heading("The same holograms on both"),
+            _methods(found),
+            f"PSNR in linear light, means over {len(found.pictures)} pictures that the twin did not learn from, with "
+            "95 % intervals. Further: the error of a capture of the twin over that of a second photograph, both "
+            "against the first photograph.",
+            Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
+            "Pale: the twin with its maps turned by half a turn (x), and without maps (+).",
+            heading("Beside twins that know less"),
+            _others(found),
+            f"Only what the first row has and the others lack is knowledge of {found.of}.",
+            heading("How to use it"),
+            bullets(_use(found, profile)),
+        ]
+    )
+    write_atomically(path, f"{text}\n".encode())
+    return path
+
+
+def answer(found: Trial) -> Iterable[str]:
+    """What a lab has to know before it uses the twin."""
+    gaps = {label: float(shown.gaps[:, 0].mean()) for label, shown in found.twin.items()}
+    flattery = found.difference(found.label)
+    yield (
+        f"A capture of the twin is further from a photograph than a second photograph is by {min(gaps.values()):.1f} "
+        f"to {max(gaps.values()):.1f} dB, by method."
+    )
+    sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
+    if flattery.mean > MOST:
+        sentence += f" That is more than {MOST:g} dB: it does not tell which method that learns is better."
+    yield sentence
+    for learned, words in ((False, "without a camera"), (True, "of which one was made through the twin")):
+        pair = found.worst(learned=learned)
+        yield f"Differences of two methods {words}: off by up to {pair.apart:.1f} dB ({_pair(pair)})."
+
+
+def _pair(pair: Pair) -> str:
+    return f"{pair.first} less {pair.second}: {pair.twin.mean:+.1f} dB for {pair.display.mean:+.1f}"
+
+
+def _signed(estimate: Estimate) -> str:
+    return f"{estimate.mean:+.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
+
+
+def _methods(found: Trial) -> Markdown:
+    colours = next(iter(found.twin.values())).gaps.shape[1] - 1
+    names = COLOURS if colours == len(COLOURS) else COLOURS[:0]
+    head = ["method", "display [dB]", "twin [dB]", "twin less display [dB]", "further [dB]", *names]
+    order = sorted(found.display, key=lambda label: -float(found.display[label].mean()))
+    lines = []
+    for label in order:
+        shown, scores = found.twin[label], found.display[label]
+        gaps = shown.gaps.mean(0)[: 1 + len(names)]
+        named = f"{label} (flattery)" if label == found.label else label
+        means = [f"{values.mean():.2f}" for values in (scores, shown.scores)]
+        lines.append([named, *means, _signed(found.difference(label)), *(f"{gap:.2f}" for gap in gaps)])
+    return table(head, lines)
+
+
+def _others(found: Trial) -> Markdown:
+    head = ["display", "further, mean [dB]", "Kendall's tau", "two without a camera, off by [dB]", "flattery [dB]"]
+    lines = [
+        [
+            name,
+            f"{np.mean([each.gaps[:, 0].mean() for each in shown.values()]):.1f}",
+            f"{found.tau(name):.2f}",
+            f"{found.worst(name).apart:.1f}",
+            _signed(found.difference(found.label, name)),
+        ]
+        for name, shown in found.twins.items()
+    ]
+    return table(head, lines)
+
+
+def _use(found: Trial, profile: Path) -> Iterable[str | Markdown]:
+    yield Markdown("In a config: {}; with every command that takes a display: {}.").format(
+        code(f"display: {{profiles: [{profile.name}]}}"), code(f"--display {profile.name}")
+    )
+    yield (
+        f"It has learned {found.of} from {found.photographs} photographs, on this panel: it takes no other size. What "
+        "drifts or flickers on the display does not do so here."
+    )
+    yield "Methods that have the equations of the bench fit a twin better than the display: expect less there."
+
+
+def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: Trial) -> None:
+    (cells,), on_twins = photographed.cells().values(), trial.cells()
+    item = found.pictures[0]
+    target, rows = photographed.target(item), {}
+    for label in dict.fromkeys((photographed.study.baseline, found.label)):
+        first, second = (photographed.captures(cell)[0] for cell in cells[label, item][:2])
+        twin = trial.captures(on_twins[found.name][label, item][0])[0]
+        shown = match(first, target)[0]
+        rows[label] = shown.numpy(), match(second, shown)[0].numpy(), match(twin, shown)[0].numpy()
+    draw_twin_pictures(folder / PICTURES, rows)
+    names = {entry.label: entry.name for entry in photographed.study.methods}
+    own, *others = ({label: each.scores for label, each in shown.items()} for shown in found.twins.values())
+    draw_twin_scores(folder / SCORES, found.display, own, looks(names), others)

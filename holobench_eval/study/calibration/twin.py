@@ -1,0 +1,263 @@
+"""From the photographs of a study to the twin of their display, and to the study that tries it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+from torch import Tensor
+
+from ...core.errors import UserError
+from ...core.installed import shipped_configs
+from ...core.io import file_name, write_atomically
+from ...display import Profile, load_profile
+from ...display.simulated.maps import load_maps
+from ...display.simulated.stages import Sensor
+from ...lab.bench_file import load_bench_file
+from ...lab.session import read_manifest
+from ...methods.files.arrays import read_array
+from ...methods.twin.method import learned_twin
+from ...methods.twin.to_profile import to_profile, write_profile
+from ...metrics import match
+from ..artifacts import Artifact, Artifacts
+from ..config import load_study
+from ..definition import Study
+from ..displays import Condition, displays
+from ..folders.session import ARTIFACTS, REPORT, study_of
+from ..opening import open_bench
+from ..plan import Cell, Plan, plan
+from ..scoring.scores import kept_capture
+from ..store import Store
+
+PHOTOGRAPHS, TRIAL = "photographs", "trial"  # in the folder of a twin: two studies, a config and a report each
+TURNED, BLANK = "turned", "blank"  # displays that a twin has to be better than
+OVER_PANEL = ("lut.gain", "illumination.amplitude", "illumination.phase")
+NOISY = 4  # pictures that tell the noise of a camera
+
+
+def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
+    """The config of the photographs of a display: a profile, by name or file, or the file of a bench."""
+    config = yaml.safe_load(shipped_configs()["twin"].read_bytes())
+    path = Path(display)
+    shown = str(path.resolve()) if path.is_file() else display
+    config["title"] = f"Photographs for a twin of {path.stem if path.is_file() else display}"
+    config["display"] = {"bench": shown} if is_bench(path) else {"profiles": [shown], "panel": list(panel)}
+    config["targets"]["params"]["count"] = pictures
+    return yaml.safe_dump(config, sort_keys=False)
+
+
+def is_bench(path: Path) -> bool:
+    """Whether a file describes a bench with devices: it has no seed, as every profile has that is like no other."""
+    if not path.is_file():
+        return False
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError):
+        return False  # which load_profile says with its place
+    return isinstance(data, dict) and not data.keys() & {"seed", "like"}
+
+
+@dataclass(frozen=True)
+class Photographed:
+    """A study whose photographs are taken. output: of its records; artifacts: what its methods have learned."""
+
+    study: Study
+    output: Path
+    artifacts: Path
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Its plan."""
+        return plan(self.study)
+
+    @cached_property
+    def display(self) -> Condition:
+        """Its one display. UserError: it has several."""
+        own = list(displays(self.study).values())
+        if len(own) != 1:
+            raise UserError(f"{self.study.file}: {len(own)} displays; a twin is of one")
+        return own[0]
+
+    @cached_property
+    def label(self) -> str:
+        """Of the row that has learned the twin. UserError: there are none or several."""
+        labels = [entry.label for entry in self.study.methods if entry.name == "twin"]
+        if len(labels) != 1:
+            raise UserError(f"{self.study.file}: {len(labels)} methods are called twin; expected one")
+        return labels[0]
+
+    def cells(self) -> dict[str, dict[tuple[str, str], list[Cell]]]:
+        """The cells of methods by display, and by label and target, in the order of repeats."""
+        found: dict[str, dict[tuple[str, str], list[Cell]]] = {}
+        for label, cell in self.plan.labelled():
+            if cell.code:
+                found.setdefault(cell.condition, {}).setdefault((label, cell.target), []).append(cell)
+        return found
+
+    def captures(self, cell: Cell) -> tuple[Tensor, float]:
+        """The kept capture ``(C, h, w)`` of a cell, and its PSNR [dB]. UserError: it was not taken, or is damaged."""
+        store = Store(self.output)
+        record, kept = store.read(cell.id), kept_capture(store.capture(cell.id))
+        if record is None or record.state != "done" or not kept:
+            state = "waits for its photograph" if record is None else record.reason or "has lost its capture"
+            raise UserError(f"{self.output}: {cell.method} on {cell.target} {state}; a twin needs every cell")
+        return kept[0], record.values()["psnr_linear"]
+
+    def target(self, item: str) -> Tensor:
+        """A picture ``(C, h, w)`` of linear light, as the display is to show it."""
+        spec = self.display.spec
+        picture: Tensor = self.study.dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
+        return picture
+
+    @cached_property
+    def twice(self) -> list[tuple[str, str]]:
+        """Labels and targets whose hologram was photographed twice: a method with random starts finds another one in
+        each repeat. UserError: there are none."""
+        (cells,) = self.cells().values()
+        same = [
+            (label, item)
+            for (label, item), own in cells.items()
+            if len(own) > 1 and torch.equal(self.phase(label, item), self.phase(label, item, own[1].repeat))
+        ]
+        if not same:
+            raise UserError(f"{self.study.file}: no hologram is photographed twice; set 'repeats: 2'")
+        return same
+
+    def pair(self, label: str, item: str) -> list[Tensor]:
+        """Two photographs of one of ``twice``."""
+        (cells,) = self.cells().values()
+        return [self.captures(cell)[0] for cell in cells[label, item][:2]]
+
+    def phase(self, label: str, item: str, repeat: int = 0) -> Tensor:
+        """A hologram ``(C, H, W)`` [rad] that the study has saved. UserError: it has not."""
+        path = self.phases(label) / f"{file_name(item)}{f'-{repeat}' * (repeat > 0)}.npy"
+        if not path.is_file():
+            raise UserError(f"{path}: no such hologram; a twin needs 'save: {{phases: true}}'")
+        return torch.from_numpy(read_array(path))
+
+    def phases(self, label: str) -> Path:
+        """Where the holograms of a method are."""
+        return (self.output / "phases" / file_name(label) / file_name(self.display.name)).resolve()
+
+    @cached_property
+    def learned(self) -> Artifact:
+        """What the row of the twin has learned. UserError: it was not trained."""
+        wanted = next(task.preparation for task in self.plan.tasks if task.label == self.label)
+        assert wanted is not None
+        artifacts = Artifacts(self.artifacts)
+        if not artifacts.has(wanted):
+            raise UserError(f"{artifacts.folder}: has no trained {self.label}; {artifacts.failure(wanted)}")
+        return artifacts.load(wanted)
+
+
+def of_session(folder: Path) -> Photographed:
+    """The study of a session's folder. UserError as ``study_of``."""
+    return Photographed(study_of(folder, read_manifest(folder), None), folder / REPORT, folder / ARTIFACTS)
+
+
+def in_folder(folder: Path, artifacts: Path, name: str = PHOTOGRAPHS) -> Photographed:
+    """The study of that name in the folder of a twin."""
+    return Photographed(load_study(folder / f"{name}.yaml"), folder / name, artifacts)
+
+
+def nominal(name: str, photographed: Photographed) -> Profile:
+    """What is known of a display before any photograph, as a profile: its nominal panel, and a camera as any."""
+    display = photographed.display
+    if display.real is not None and display.real.bench is not None:
+        bench = load_bench_file(display.real.bench)
+        panel, bound = bench.panel, bench.residual_bound
+    else:
+        profile = load_profile(display.source, display.folder).scaled(display.spec.shape)
+        panel, bound = profile.panel, profile.residual_bound
+    words = f"The twin of {display.name}, learned from photographs."
+    return Profile(name, 1, 0, words, panel=panel, residual_bound=bound)
+
+
+def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
+    """Write the twin as a profile, two that it has to be better than, and the study of all three.
+
+    Of ``turned`` the maps over the panel are turned by half a turn, ``blank`` has no maps. The camera's noise is that
+    of two photographs. Returns the profile of the twin, whose maps are in ``folder / TRIAL``.
+    """
+    trial = folder / TRIAL
+    base = nominal(name, photographed)
+    model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
+    untried = load_profile(str(to_profile(model, camera, base, trial)))
+    base = replace(base, sensor=_camera(photographed, untried))
+    profile = load_profile(str(to_profile(model, camera, base, trial)))
+    held = load_maps(profile.maps, trial, _sizes(profile))
+    turned = {key: values.flip(-2, -1) if key in OVER_PANEL else values for key, values in held.items()}
+    for other, maps in ((TURNED, turned), (BLANK, {})):
+        write_profile(maps, replace(base, name=f"{name}-{other}"), trial)
+    write_atomically(folder / f"{TRIAL}.yaml", _trial_text(photographed, name).encode())
+    return profile
+
+
+def _sizes(profile: Profile) -> dict[str, int]:
+    rows, columns = profile.panel.shape
+    colours, levels = len(profile.panel.wavelengths), 2**profile.panel.bits
+    return {"colours": colours, "levels": levels, "rows": rows, "columns": columns}
+
+
+def _camera(photographed: Photographed, profile: Profile) -> Sensor:
+    """The camera of a profile, whose well and read noise are such that two captures differ as two photographs do."""
+    seen = simulated = 0.0
+    bench = open_bench(profile, seed=photographed.study.seed)
+    for label, item in photographed.twice[:NOISY]:
+        target, phase = photographed.target(item), photographed.phase(label, item)
+        simulated += _difference([bench.photograph(phase, target, item, again).image for again in (0, 1)], target)
+        seen += _difference(photographed.pair(label, item), target)
+    ratio = simulated / max(seen, 1e-12)
+    sensor = profile.sensor
+    well, read = sensor.full_well * ratio, sensor.read_noise * math.sqrt(ratio)
+    return replace(sensor, full_well=float(f"{well:.4g}"), read_noise=float(f"{read:.4g}"))
+
+
+def _difference(captures: Sequence[Tensor], target: Tensor) -> float:
+    """Mean square of the difference of two captures ``(C, h, w)``, each matched to the target."""
+    first, second = (match(capture, target)[0] for capture in captures)
+    return float((first - second).square().mean())
+
+
+def _trial_text(photographed: Photographed, name: str) -> str:
+    """The config that shows the holograms of a display on its twin."""
+    study = photographed.study
+    rows: list[Mapping[str, Any]] = [
+        {"name": "phases", "label": label, "params": {"file": str(photographed.phases(label) / "{target}.npy")}}
+        for label in study.labels
+    ]
+    config = {
+        "title": f"{photographed.display.name} on its twin",
+        "seed": study.seed,
+        "display": {"profiles": [f"{TRIAL}/{file_name(each)}.yaml" for each in trial_names(name)]},
+        "targets": {"dataset": study.targets.dataset, "params": dict(study.targets.params)},
+        "methods": rows,
+        "protocol": {"metrics": ["psnr", "ssim"]},
+        "baseline": study.baseline,
+    }
+    return yaml.safe_dump(config, sort_keys=False)
+
+
+def trial_names(name: str) -> tuple[str, str, str]:
+    """The displays of a trial: the twin, and those that it has to be better than."""
+    return name, f"{name}-{TURNED}", f"{name}-{BLANK}"
+
+
+def publish(profile: Profile, folder: Path) -> Path:
+    """Write the twin with what is known of it; the first of its version, or the next where another was written before.
+
+    profile: of the trial, whose maps it has.
+    """
+    held = load_maps(profile.maps, folder / TRIAL, _sizes(profile))
+    path = folder / f"{file_name(profile.name)}.yaml"
+    if path.is_file():
+        before = load_profile(str(path))
+        same = (before.maps, before.twin, before.sensor) == (profile.maps, profile.twin, profile.sensor)
+        profile = replace(profile, version=before.version + (not same))
+    return write_profile(held, profile, folder)
