@@ -28,12 +28,14 @@ DISC_POINTS = 129  # along the diameter
 
 @dataclass(frozen=True)
 class Estimate:
-    """One number about a display. colour: index of the channel, None for all of them."""
+    """One number about a display. colour: index of the channel, None for all of them; error: what it is off by at most,
+    with a probability of 90 %, infinite where no capture shows it; None for that of the quantity."""
 
     name: str
     colour: int | None
     value: float
     unit: str
+    error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,8 @@ def reach(wavelength: float, distance: float, pitch: float, pupil: float | None)
 def joined(estimates: Iterable[Estimate], truths: Iterable[Estimate]) -> list[dict[str, object]]:
     """Estimates beside the truth of the same name and colour, None where there is none, as plain values for a file.
 
-    error: the stated error of the quantity, None for one that is not in ``QUANTITIES``.
+    error: that of the estimate, else of the quantity; None for one that is not in ``QUANTITIES``, and with ``seen``
+    false for one that no capture shows.
     """
     known = {(item.name, item.colour): item.value for item in truths}
     return [
@@ -170,10 +173,16 @@ def joined(estimates: Iterable[Estimate], truths: Iterable[Estimate]) -> list[di
             "unit": item.unit,
             "value": _finite(item.value),
             "truth": _finite(known.get((item.name, item.colour))),
-            "error": QUANTITIES[item.name].error if item.name in QUANTITIES else None,
+            "error": _finite(_error(item)),
+            **({"seen": False} if _error(item) == math.inf else {}),
         }
         for item in estimates
     ]
+
+
+def _error(item: Estimate) -> float | None:
+    known = QUANTITIES.get(item.name)
+    return item.error if item.error is not None or known is None else known.error
 
 
 def _finite(value: float | None) -> float | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.io import write_atomically
+from ..display.estimates import QUANTITIES
 from ..display.simulated.trust import MOST
 from ..metrics import match
 from ..study.calibration.twin import Photographed
@@ -16,6 +17,7 @@ from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .data.statistics import Estimate
 from .data.twin import Pair, Trial
 from .markdown import Markdown, blocks, bullets, code, heading, table
+from .sections.diagnosis import quantities
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"
@@ -41,6 +43,8 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             heading("Beside twins that know less"),
             _others(found),
             f"Only what the first row has and the others lack is knowledge of {found.of}.",
+            heading("What it says of the display"),
+            *_parameters(photographed),
             heading("How to use it"),
             bullets(_use(found, profile)),
         ]
@@ -102,6 +106,18 @@ def _others(found: Trial) -> Markdown:
         for name, shown in found.twins.items()
     ]
     return table(head, lines)
+
+
+def _parameters(photographed: Photographed) -> Iterable[Markdown | str]:
+    rows = photographed.learned.provenance.get("estimates") or []
+    yield quantities(rows)
+    hidden = [QUANTITIES[row["name"]].words for row in rows if row.get("seen") is False]
+    yield (
+        "Stated errors hold with 90 %, from fits to halves of the photographs that show different holograms; in "
+        "brackets the truth, where the display is simulated."
+    )
+    if hidden:
+        yield f"No photograph shows: {', '.join(dict.fromkeys(hidden))}."
 
 
 def _use(found: Trial, profile: Path) -> Iterable[str | Markdown]:

@@ -23,12 +23,14 @@ class Diagnosed:
 
     def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
         """What the model that was learned says of the display ``spec``."""
-        return [*diagnose(learned["model"], spec), *haze(learned["terms"])]
+        model = DisplayModel(spec)
+        model.load_state_dict(dict(learned["model"]))
+        return [*diagnose(model), *haze(learned["terms"])]
 
 
 @torch.no_grad()
-def diagnose(state: Mapping[str, Tensor], spec: DisplaySpec) -> list[Estimate]:
-    """The quantities of ``display.estimates`` in the state of a ``DisplayModel`` for the display ``spec``.
+def diagnose(model: DisplayModel) -> list[Estimate]:
+    """The quantities of ``display.estimates`` in a model.
 
     Learned from images, the model leaves these open, and so the estimates do not depend on them:
 
@@ -39,11 +41,9 @@ def diagnose(state: Mapping[str, Tensor], spec: DisplaySpec) -> list[Estimate]:
     - mean amplitude of the beam against brightness: their product is the light;
     - curvature of the beam against defocus and astigmatism: they are added (``display.estimates.focusing``).
     """
-    model = DisplayModel(spec)
-    model.load_state_dict(dict(state))
     return [
         value
-        for colour in range(len(spec.wavelengths))
+        for colour in range(len(model.spec.wavelengths))
         for value in (*_panel_estimates(model, colour), *_optics_estimates(model, colour))
     ]
 

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, ClassVar
 
+import torch
 from annotated_types import Interval
 
 from ...display.api import DisplaySpec
+from ...display.estimates import Estimate
 from ...display.training import TrainingBench
 from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.display_model import FORM
 from ..calibrated.method import ShortSchedule, ThroughModel
-from ..calibrated.patterns import pattern_samples
+from ..calibrated.patterns import dark_samples, pattern_samples
 from ..double_phase import DoublePhase
 from ..gerchberg_saxton import GerchbergSaxton
 from ..learned.samples import Sample, Steps, captured
 from ..learned.weights import refuse_other_weights
 from ..sgd import AmplitudeSGD
 from ..wirtinger import Wirtinger
+from .errors import estimates, unseen
 from .model import TwinCamera, TwinModel
 
 OPEN_LOOP = (Wirtinger(), DoublePhase(), AmplitudeSGD(), GerchbergSaxton())
@@ -75,6 +79,34 @@ class Twin(ThroughModel):
     def approximator(self, spec: DisplaySpec) -> ModelApproximator:
         """A display that is as the nominal model says, but for a little crosstalk."""
         return ModelApproximator(TwinModel(spec), None, self.RATES, TwinCamera(spec))
+
+    def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
+        """See the base; ``halves``, what it learns of either half of the captures, and ``unseen`` are for errors."""
+        learned = super().prepare(bench)
+        earlier, dark = self._earlier(bench), dark_samples(bench)
+        model, camera = learned_twin(learned, bench.spec)
+        halves = [
+            bench.kept(f"half {number}", partial(self._refined, bench, learned, [*earlier[number::2], *dark], number))
+            for number in (0, 1)
+        ]
+        hidden = unseen(model.to(bench.device), camera.to(bench.device), [*earlier, *dark])
+        return {**learned, "halves": halves, "unseen": hidden}
+
+    def _refined(
+        self, bench: TrainingBench, learned: Mapping[str, Any], samples: Sequence[Sample], number: int
+    ) -> dict[str, Any]:
+        """What a twin learns that goes on from what it has learned with these samples alone."""
+        again, steps = self.approximator(bench.spec).to(bench.device), self.training.refine_steps
+        again.load_learned(learned)
+        draw, passes = bench.generator("half", number), -(-steps // len(samples))
+        order = torch.cat([torch.randperm(len(samples), generator=draw) for _ in range(passes)]).tolist()
+        for step in range(steps):
+            again.step(samples[order[step]], step / steps)
+        return again.learned()
+
+    def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
+        """What it says of the display ``spec``, with errors."""
+        return estimates(learned, spec)
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
         numbers = range(self.holograms)

@@ -46,7 +46,7 @@ def diagnoses(trainings: Sequence[Training]) -> list[tuple[str, Markdown, str]]:
     return [
         (
             item.name if item.name.endswith(f" on {item.display}") else f"{item.name} on {item.display}",
-            _table(rows),
+            quantities(rows),
             _verdict(rows),
         )
         for item in trainings
@@ -85,12 +85,13 @@ def _known(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST  # not for NaN
 
 
-def _table(rows: Sequence[Row]) -> Markdown:
+def quantities(rows: Sequence[Row]) -> Markdown:
     """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth."""
     colours = sorted({row["colour"] for row in rows if isinstance(row.get("colour"), int)})
     if colours == [0]:  # of the only laser
         rows, colours = [{**row, "colour": None} for row in rows], []
     columns: list[int | None] = [*colours, *([None] if any(row.get("colour") is None for row in rows) else [])]
+    told = any(_known(row.get("truth")) for row in rows)
     lines = []
     for name in dict.fromkeys(row["name"] for row in rows):
         same = {row.get("colour"): row for row in rows if row["name"] == name}
@@ -101,13 +102,17 @@ def _table(rows: Sequence[Row]) -> Markdown:
             [
                 words,
                 first.get("unit") or "",
-                *(_cell(same[colour]) if colour in same else "" for colour in columns),
+                *(_cell(same[colour], told) if colour in same else "" for colour in columns),
                 f"{max(off):.3f}" if off else "–",
-                f"{first['error']:g}" if _known(first.get("error")) else "–",
+                "not seen" if first.get("seen") is False else _stated(first),
             ]
         )
     heads = [_colour(colour) for colour in columns]
     return table(["quantity", "unit", *heads, "largest difference", "stated error"], lines)
+
+
+def _stated(row: Row) -> str:
+    return f"{row['error']:.2g}" if _known(row.get("error")) else "–"
 
 
 def _colour(colour: int | None) -> str:
@@ -116,8 +121,10 @@ def _colour(colour: int | None) -> str:
     return COLOURS[colour] if 0 <= colour < len(COLOURS) else f"colour {colour}"
 
 
-def _cell(row: Row) -> str:
-    return f"{row['value']:.3f} ({row['truth']:.3f})" if _known(row.get("truth")) else f"{row['value']:.3f} (–)"
+def _cell(row: Row, told: bool) -> str:
+    """The value; and the truth, where any of the table is told."""
+    truth = f"{row['truth']:.3f}" if _known(row.get("truth")) else "–"
+    return f"{row['value']:.3f}" + f" ({truth})" * told
 
 
 def difference(row: Row) -> float:

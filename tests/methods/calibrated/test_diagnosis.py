@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import pytest
 import torch
-from torch import Tensor
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.api import DisplaySpec
@@ -32,7 +31,7 @@ def spec() -> DisplaySpec:
 
 
 def told(model: DisplayModel) -> dict[str, float]:
-    return {one.name: one.value for one in diagnose(model.state_dict(), model.spec) if one.colour == COLOUR}
+    return {one.name: one.value for one in diagnose(model) if one.colour == COLOUR}
 
 
 @torch.no_grad()
@@ -126,7 +125,7 @@ def test_a_model_that_learned_from_speckle_patterns_tells_its_display_within_the
     approximator, steps = HILPlus().approximator(bench.spec), 240
     for step in range(steps):
         approximator.step(samples[step % len(samples)], step / steps)
-    rows = joined(diagnose(approximator.model.state_dict(), bench.spec), truth(bench))
+    rows = joined(diagnose(approximator.model), truth(bench))
     assert len(rows) == 3 * 12
     off = {(row["name"], row["colour"]): difference(row) for row in rows}
     outside = {key: value for key, value in off.items() if value > 1}
@@ -137,9 +136,3 @@ def difference(row: dict[str, object]) -> float:
     """In units of the stated error."""
     value, known, error = (row[key] for key in ("value", "truth", "error"))
     return abs(value - known) / error
-
-
-def test_the_state_of_another_model_is_refused(spec: DisplaySpec) -> None:
-    state: dict[str, Tensor] = {"table": torch.zeros(1)}
-    with pytest.raises(RuntimeError, match="Missing key"):
-        diagnose(state, spec)

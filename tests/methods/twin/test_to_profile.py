@@ -114,5 +114,5 @@ def test_a_display_made_of_an_untrained_twin_has_its_panel(tmp_path: Path) -> No
 
 def test_a_twin_of_another_panel_is_refused(tmp_path: Path) -> None:
     spec = base(0.8, (0.0, 0.0)).spec()
-    with pytest.raises(UserError, match="^'lab': the model is not of this panel"):
+    with pytest.raises(UserError, match=r"^'lab': the model is not of this panel"):
         to_profile(TwinModel(spec), TwinCamera(spec), named(base(0.7, (0.0, 0.0)), "lab"), tmp_path)

@@ -83,7 +83,7 @@ def test_numbers_of_a_stranger_are_shown_with_what_is_known_of_them() -> None:
     ((_, shown, verdict),) = diagnoses([trained(estimates=rows)])
     header, _, hue = lines(shown)
     assert header == ["quantity", "unit", "colour 7", "all", "largest difference", "stated error"]
-    assert hue == ["hue of", "", "1.000 (–)", "2.000 (–)", "–", "–"]
+    assert hue == ["hue of", "", "1.000", "2.000", "–", "–"]
     assert verdict.startswith("None of these")
     rows = [{"name": "hue_of", "value": 2, "colour": 0}, {"name": "width", "value": 1.0, "colour": None}]
     ((_, shown, _),) = diagnoses([trained(estimates=rows)])  # the only laser has no column of its own

@@ -1,0 +1,125 @@
+"""How well captures determine what a twin says of its display: fits to halves of them, and what no capture shows.
+
+Errors from noise alone are far too small, since what the model lacks decides. The halves hold holograms of different
+kinds, which what it lacks pulls apart.
+"""
+
+from __future__ import annotations
+
+import cmath
+import copy
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from ...display.api import DisplaySpec
+from ...display.estimates import QUANTITIES, Estimate
+from ...optics.phase import TAU
+from ..calibrated.approximator import PredictedCapture
+from ..calibrated.diagnosis import diagnose, haze
+from ..calibrated.display_model import KNOTS, MODES
+from ..learned.samples import Sample
+from .model import TwinCamera, TwinModel
+
+QUANTILE = 2.35  # of Student's t, 90 % of which lie within: a spread over three colours
+FAINTEST = 0.01  # of what a fit leaves of a capture: a smaller change is not seen
+LOOKED_AT = 6  # captures of each kind
+
+
+def estimates(learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
+    """What a twin says of its display, with the errors; infinite for what no capture shows."""
+    whole, *halves = (_quantities(state, spec) for state in (learned, *learned["halves"]))
+    errors = {name: math.inf if name in learned["unseen"] else _spread(name, *halves) for name in names(whole)}
+    return [replace(item, error=errors[item.name]) for item in whole]
+
+
+def names(items: Iterable[Estimate]) -> list[str]:
+    """Of quantities, each once."""
+    return list(dict.fromkeys(item.name for item in items))
+
+
+def _quantities(state: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
+    model = TwinModel(spec)
+    model.load_state_dict(dict(state["model"]))
+    return [*diagnose(model), *haze(state["terms"])]
+
+
+def _spread(name: str, first: Sequence[Estimate], second: Sequence[Estimate]) -> float:
+    """Error of a fit to all captures, of which each half has half: its standard deviation times the quantile."""
+    values = [{item.colour: item.value for item in half if item.name == name} for half in (first, second)]
+    apart = [values[0][colour] - values[1][colour] for colour in values[0].keys() & values[1].keys()]
+    if QUANTITIES[name].unit == "rad":
+        apart = [math.remainder(each, TAU) for each in apart]
+    return QUANTILE * math.sqrt(sum(each**2 for each in apart) / len(apart)) / 2 if apart else math.inf
+
+
+@torch.no_grad()
+def unseen(model: TwinModel, camera: TwinCamera, samples: Sequence[Sample]) -> list[str]:
+    """Quantities of which a change by their usual error changes captures by next to nothing."""
+    looked_at = samples[:: max(1, len(samples) // LOOKED_AT)]
+    shown = PredictedCapture(model, None, camera)
+    before = [shown(sample.phase, sample.light) for sample in looked_at]
+    left = sum(float((image - sample.capture).square().mean()) for image, sample in zip(before, looked_at, strict=True))
+    found = []
+    for name, nudge in NUDGES.items():
+        pair = copy.deepcopy(model), copy.deepcopy(camera)
+        nudge(*pair, QUANTITIES[name].error)
+        nudged = PredictedCapture(pair[0], None, pair[1])
+        changed = sum(
+            float((nudged(sample.phase, sample.light) - image).square().mean())
+            for image, sample in zip(before, looked_at, strict=True)
+        )
+        if changed < FAINTEST**2 * left:
+            found.append(name)
+    return found
+
+
+Nudge = Callable[[TwinModel, TwinCamera, float], None]  # changes a twin by an amount of a quantity, in all colours
+
+
+def _exponent(model: TwinModel, camera: TwinCamera, amount: float) -> None:
+    level = torch.linspace(0, 1, KNOTS, device=model.table.device)
+    model.table.add_(TAU * (level ** (1 + amount) - level))
+
+
+def _undiffracted(model: TwinModel, camera: TwinCamera, amount: float) -> None:
+    ratios = torch.view_as_complex(model.undiffracted)
+    share = ratios.abs().square() / (1 + ratios.abs().square()) + amount
+    model.undiffracted.copy_(torch.view_as_real(torch.polar((share / (1 - share)).sqrt(), ratios.angle())))
+
+
+def _undiffracted_phase(model: TwinModel, camera: TwinCamera, amount: float) -> None:
+    model.undiffracted.copy_(torch.view_as_real(torch.view_as_complex(model.undiffracted) * cmath.exp(1j * amount)))
+
+
+def _log(module: nn.Module, parameter: str, amount: float) -> None:
+    values: Tensor = getattr(module, parameter)
+    values.copy_((values.exp() + amount).log())
+
+
+def _stray(model: TwinModel, camera: TwinCamera, amount: float) -> None:
+    camera.share.copy_((camera.share.sigmoid() + amount).clamp(max=0.99).logit())
+
+
+def _aberration(mode: int) -> Nudge:
+    def nudge(model: TwinModel, camera: TwinCamera, amount: float) -> None:
+        model.aberration[:, mode] += TAU * amount
+
+    return nudge
+
+
+NUDGES: Mapping[str, Nudge] = {
+    "lut_exponent": _exponent,
+    "phase_gain": lambda model, camera, amount: _log(model, "gain", amount),
+    "crosstalk": lambda model, camera, amount: _log(model, "crosstalk", amount),
+    "undiffracted_fraction": _undiffracted,
+    "undiffracted_phase": _undiffracted_phase,
+    "light": lambda model, camera, amount: _log(model, "brightness", amount),
+    "stray_share": _stray,
+    "stray_reach": lambda model, camera, amount: _log(camera, "reach", amount),
+    **{name: _aberration(mode) for mode, name in enumerate(MODES)},
+}
