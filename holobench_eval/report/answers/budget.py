@@ -56,9 +56,11 @@ def _of(results: Results, condition: str, found: dict[str, list[str]]) -> str:
         elif any(test for _, test in tests):
             failed.append(name)
     best = results.ranking(condition, categories=(*OFFLINE, ONLINE))[0]
-    few = ", ".join(text for _, text in sorted(passed)) or "none"
-    never = f"; never: {words(failed)}" if failed else ""
     most = f"{best} with {number(_captures(results, best, condition))}, {value(results, best, condition)}"
+    if not passed:
+        return f"With no number of photographs, of those tried, {words(list(found))} is shown to beat {baseline}. Best: {most}."
+    few = ", ".join(text for _, text in sorted(passed))
+    never = f"; never: {words(failed)}" if failed else ""
     return f"Fewest photographs, of those tried, that beat {baseline}: {few}{never}. Best: {most}."
 
 

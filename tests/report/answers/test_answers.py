@@ -202,6 +202,16 @@ def test_a_budget_names_the_fewest_photographs_that_pass_and_who_never_does() ->
     )
 
 
+def test_a_budget_that_no_method_passes_says_so() -> None:
+    found = results_of(
+        {"old": 17.0, "bad, 5": 15.0, "bad, 10": 16.0},
+        names={"old": "old", "bad, 5": "bad", "bad, 10": "bad"},
+        captures={"bad, 5": 5, "bad, 10": 10},
+        camera=frozenset({"bad, 5", "bad, 10"}),
+    )
+    assert answer(found).startswith("With no number of photographs, of those tried, bad is shown to beat old. Best: ol")
+
+
 def prediction(**changes: Any) -> Results:
     means = {"old": 20.0, "new": 22.0, "poor": 15.0, "nothing": 18.0}
     given = {
