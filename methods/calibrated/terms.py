@@ -89,9 +89,12 @@ class ImageTerms(Haze):
 
     def _counted(self, light: Tensor) -> Tensor:
         """Shading and tone of the light ``(C, h, w)`` of the region, and the offset."""
-        shading = torch.exp(torch.einsum("cm,mhw->chw", self.shading, self.monomials))
         gain, gamma = (value.exp()[:, None, None] for value in (self.gain, self.gamma))
-        return gain * (shading * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]
+        return gain * (self.shaded() * light).clamp_min(DARK) ** gamma + self.offset[:, None, None]
+
+    def shaded(self) -> Tensor:
+        """The factor of the light over the region, ``(C, h, w)``."""
+        return torch.exp(torch.einsum("cm,mhw->chw", self.shading, self.monomials))
 
 
 def spread(side: int, width: Tensor, lossless: bool = False) -> Tensor:

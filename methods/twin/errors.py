@@ -42,10 +42,19 @@ def names(items: Iterable[Estimate]) -> list[str]:
     return list(dict.fromkeys(item.name for item in items))
 
 
+@torch.no_grad()
 def _quantities(state: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
-    model = TwinModel(spec)
+    model, camera = TwinModel(spec), TwinCamera(spec)
     model.load_state_dict(dict(state["model"]))
-    return [*diagnose(model), *haze(state["terms"])]
+    camera.load_state_dict(dict(state["terms"]))
+    counted = (camera.shaded().mean((-2, -1)) * camera.gain.exp()).tolist()  # of the light, by colour
+    found = [*diagnose(model), *haze(state["terms"])]
+    return [
+        replace(item, value=item.value * counted[item.colour])
+        if item.name == "light" and item.colour is not None
+        else item
+        for item in found
+    ]
 
 
 def _spread(name: str, first: Sequence[Estimate], second: Sequence[Estimate]) -> float:

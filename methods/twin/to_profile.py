@@ -136,7 +136,7 @@ def image_maps(model: TwinModel, camera: TwinCamera) -> dict[str, Tensor]:
 def _shading(model: TwinModel, camera: TwinCamera) -> Tensor:
     """The factor over all of the image, ``(C, H, W)``; around the region that of its edge."""
     region, (height, width) = model.spec.region, model.spec.shape
-    inside = torch.exp(torch.einsum("cm,mhw->chw", camera.shading, camera.monomials))
+    inside = camera.shaded()
     rows = (torch.arange(height) - region.top).clamp(0, region.height - 1)
     columns = (torch.arange(width) - region.left).clamp(0, region.width - 1)
     return inside[:, rows][:, :, columns]

@@ -58,7 +58,8 @@ def _of(results: Results, condition: str, found: dict[str, list[str]]) -> str:
     best = results.ranking(condition, categories=(*OFFLINE, ONLINE))[0]
     most = f"{best} with {number(_captures(results, best, condition))}, {value(results, best, condition)}"
     if not passed:
-        return f"With no number of photographs, of those tried, {words(list(found))} is shown to beat {baseline}. Best: {most}."
+        which = words(list(found))
+        return f"With no number of photographs, of those tried, {which} is shown to beat {baseline}. Best: {most}."
     few = ", ".join(text for _, text in sorted(passed))
     never = f"; never: {words(failed)}" if failed else ""
     return f"Fewest photographs, of those tried, that beat {baseline}: {few}{never}. Best: {most}."

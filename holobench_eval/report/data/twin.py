@@ -139,12 +139,16 @@ class Noise:
 
     @classmethod
     def of(cls, pairs: Sequence[Sequence[Tensor]]) -> Noise:
-        """Of pairs of photographs ``(C, h, w)`` of one hologram each, by least squares over all pixels."""
-        light = torch.stack([(first + second) / 2 for first, second in pairs]).double().transpose(0, 1).flatten(1)
-        squares = torch.stack([(first - second).square() / 2 for first, second in pairs]).double()
+        """Of pairs of photographs ``(C, h, w)`` of one hologram each, in equal brightness, by least squares over all
+        pixels."""
+        firsts, seconds = (torch.stack(each).double() for each in zip(*pairs, strict=True))
+        area = (-2, -1)
+        seconds = seconds * ((firsts * seconds).sum(area, True) / seconds.square().sum(area, True).clamp_min(DARKEST))
+        light, squares = (
+            each.transpose(0, 1).flatten(1) for each in ((firsts + seconds) / 2, (firsts - seconds).square() / 2)
+        )
         powers = torch.stack([light**power for power in range(3)], -1)
-        found = torch.linalg.lstsq(powers, squares.transpose(0, 1).flatten(1)[..., None]).solution
-        return cls(found[..., 0])
+        return cls(torch.linalg.lstsq(powers, squares[..., None]).solution[..., 0])
 
     def __call__(self, photograph: Tensor) -> Tensor:
         """Mean variance of a photograph ``(C, h, w)``, ``(C,)``."""
@@ -156,8 +160,10 @@ class Noise:
 def further(photograph: Tensor, capture: Tensor, target: Tensor, noise: Noise) -> Tensor:
     """How much further a capture ``(C, h, w)`` is from a photograph than a second photograph would be, ``(1 + C,)``
     [dB], all colours first. The photograph is matched to the target, and the capture to the photograph."""
-    first, factors = match(photograph, target)
+    factors = match(photograph, target)[1]
+    first = photograph * factors[:, None, None]  # not clipped, as noise is not
+    apart = capture * match(capture, first)[1][:, None, None] - first
     second = (2 * noise(photograph) * factors.double().square()).clamp_min(DARKEST)
-    other = (match(capture, first)[0] - first).double().square().mean((-2, -1)).clamp_min(DARKEST)
+    other = apart.double().square().mean((-2, -1)).clamp_min(DARKEST)
     ratios = torch.cat([(other.mean() / second.mean())[None], other / second])
     return 10 * ratios.log10()

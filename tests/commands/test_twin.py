@@ -1,0 +1,101 @@
+"""One command makes a twin of a display, and says how far it can stand for that."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from holobench_eval.commands import main
+from holobench_eval.commands.twin import twin
+from holobench_eval.core.errors import UserError
+from holobench_eval.display import load_profile
+from holobench_eval.report.description import basis
+from holobench_eval.study.calibration import twin as twins
+from tests.support.small_training import QUICK
+
+PANEL = (128, 128)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A folder where twins learn next to nothing, at once."""
+    whole = twins.study_text
+
+    def text(display: str, panel: tuple[int, int], pictures: int) -> str:
+        config = yaml.safe_load(whole(display, panel, pictures))
+        config["methods"] = ["double_phase", "wirtinger", {"name": "twin", "params": QUICK["twin"]}]
+        config["training"]["params"]["count"] = 4
+        config["protocol"]["metrics"] = ["psnr"]
+        return yaml.safe_dump(config)
+
+    monkeypatch.setattr(twins, "study_text", text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
+    quick: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    twin("leto-aged", Path("lab"), panel=PANEL, pictures=3)
+    profile = load_profile("lab/lab.yaml")
+    assert (profile.name, profile.version, profile.twin.of) == ("lab", 1, "leto-aged")
+    assert profile.spec().shape == PANEL
+    assert "illumination.amplitude" in profile.held
+    assert profile.twin.pictures == 3
+    assert profile.twin.gap.keys() == {"double_phase", "wirtinger", "twin"}
+    photographs = json.loads(next(Path("artifacts").glob("twin-*/provenance.json")).read_text())["captures"]
+    assert profile.twin.photographs == photographs
+    printed, report = capsys.readouterr().out, Path("lab/report.md").read_text()
+    assert "Flattery: holograms made through the twin" in printed
+    assert "| lab-turned |" in report
+    assert "| twin (flattery) |" in report
+    assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "trial/report.md"))
+    assert basis(profile).startswith(
+        f"simulated, a twin of leto-aged, learned from {photographs} photographs: its captur"
+    )
+    before = Path("lab/lab.yaml").read_bytes(), Path("lab/report.md").read_bytes()
+    twin("leto-aged", Path("lab"), panel=PANEL, pictures=3)  # nothing is left to do
+    assert (Path("lab/lab.yaml").read_bytes(), Path("lab/report.md").read_bytes()) == before
+    with pytest.raises(UserError, match=r"^lab: holds the twin of another display or of other settings"):
+        twin("ideal", Path("lab"), panel=PANEL, pictures=3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["nosuch", "-o", "lab"], "unknown profile 'nosuch'"),
+        (["leto-aged", "-o", "my lab"], "my lab: the folder names the display; expected a-z"),
+        (["empty", "-o", "lab"], "empty: a folder without manifest.json"),
+        (["pluto-fourier", "-o", "lab"], "Fresnel plane"),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    arguments: list[str],
+    fault: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("empty").mkdir()
+    monkeypatch.setattr("sys.argv", ["holoeval", "twin", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    printed = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert printed.count("\n") == 1
+    assert fault in printed
+
+
+@pytest.mark.parametrize(
+    ("text", "is_bench"), [("name: a\nseed: 3\n", False), ("like: ideal\n", False), ("slm: {}\n", True), ("- 1", False)]
+)
+def test_the_file_of_a_bench_is_told_from_a_profile(text: str, is_bench: bool, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    assert twins.is_bench(path) == is_bench
+    assert ("bench" in yaml.safe_load(twins.study_text(str(path), (128, 128), 3))["display"]) == is_bench
