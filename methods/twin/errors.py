@@ -68,12 +68,15 @@ def _spread(name: str, first: Sequence[Estimate], second: Sequence[Estimate]) ->
 
 @torch.no_grad()
 def unseen(model: TwinModel, camera: TwinCamera, samples: Sequence[Sample]) -> list[str]:
-    """Quantities of which a change by their usual error changes captures by next to nothing."""
+    """Quantities of which a change by their usual error changes captures by next to nothing; and unmodulated light that
+    the blaze moves away from the iris, of which the edges of the panel alone tell."""
+    spec = model.spec
+    is_blocked = math.hypot(*spec.blaze) > (spec.pupil or math.inf) / 2
+    found = [name for name in NUDGES if is_blocked and name.startswith("undiffracted")]
     looked_at = samples[:: max(1, len(samples) // LOOKED_AT)]
     shown = PredictedCapture(model, None, camera)
     before = [shown(sample.phase, sample.light) for sample in looked_at]
     left = sum(float((image - sample.capture).square().mean()) for image, sample in zip(before, looked_at, strict=True))
-    found = []
     for name, nudge in NUDGES.items():
         pair = copy.deepcopy(model), copy.deepcopy(camera)
         nudge(*pair, QUANTITIES[name].error)
@@ -84,7 +87,7 @@ def unseen(model: TwinModel, camera: TwinCamera, samples: Sequence[Sample]) -> l
         )
         if changed < FAINTEST**2 * left:
             found.append(name)
-    return found
+    return list(dict.fromkeys(found))
 
 
 Nudge = Callable[[TwinModel, TwinCamera, float], None]  # changes a twin by an amount of a quantity, in all colours
