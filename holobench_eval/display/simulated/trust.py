@@ -19,8 +19,8 @@ class Trust:
 
     of: the display that it was learned from, empty for a profile that is no twin; photographs: that it was learned
     from [count]; pictures: that it was tried on [count]; gap: how much further its captures are from a photograph than
-    a second photograph is, by method [dB]; flattery: score on the twin less score on the display, of holograms that were made
-    through the twin, mean over pictures [dB]; flattery_error: half of its 95 % interval [dB].
+    a second photograph is, by method [dB]; flattery: score on the twin less score on the display, of holograms that
+    were made through the twin, mean over pictures [dB]; flattery_error: half of its 95 % interval [dB].
     """
 
     of: str = ""
