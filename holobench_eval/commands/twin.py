@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..study.calibration.twin import Photographed
 
 NAME = "a-z, A-Z, 0-9, . - and _"
+PANEL_SIZE, PICTURES = (256, 256), 8  # the defaults of a display that is a profile
 
 
 def twin(
@@ -22,8 +23,10 @@ def twin(
         str, typer.Argument(help="A display profile, the file of a bench, or the folder of a finished session.")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the twin, which is named like it.")],
-    panel: Annotated[tuple[int, int], PANEL] = (256, 256),
-    pictures: Annotated[int, typer.Option(min=3, max=11, help="Photographs of so many pictures try the twin.")] = 8,
+    panel: Annotated[tuple[int, int] | None, PANEL] = None,
+    pictures: Annotated[
+        int | None, typer.Option(min=3, max=11, help="So many pictures try the twin. [default: 8]")
+    ] = None,
     artifacts: Learned = ARTIFACTS,
     retrain: Annotated[bool, RETRAIN] = False,
 ) -> None:
@@ -55,7 +58,7 @@ def twin(
 
 
 def _photographs(
-    display: str, output: Path, panel: tuple[int, int], pictures: int, artifacts: Path, retrain: bool
+    display: str, output: Path, panel: tuple[int, int] | None, pictures: int | None, artifacts: Path, retrain: bool
 ) -> Photographed:
     """The photographs of a session, or those that are taken now."""
     from ..core.io import write_atomically
@@ -66,8 +69,12 @@ def _photographs(
     if Path(display).is_dir():
         if not (Path(display) / MANIFEST).is_file():
             raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display")
+        if (panel, pictures, retrain) != (None, None, False):
+            raise UserError(f"{display}: --panel, --pictures and --retrain are not for a session, which has its study")
         return twins.of_session(Path(display))
-    text, config = twins.study_text(display, panel, pictures), output / f"{PHOTOGRAPHS}.yaml"
+    if panel and twins.is_bench(Path(display)):
+        raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
+    text, config = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES), output / f"{PHOTOGRAPHS}.yaml"
     if config.is_file() and config.read_text(encoding="utf-8") != text:
         raise UserError(f"{output}: holds the twin of another display or of other settings; choose another --output")
     write_atomically(config, text.encode())

@@ -71,6 +71,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["leto-aged", "-o", "my lab"], "my lab: the folder names the display; expected a-z"),
         (["empty", "-o", "lab"], "empty: a folder without manifest.json"),
         (["pluto-fourier", "-o", "lab"], "Fresnel plane"),
+        (["bench.yaml", "-o", "lab", "--panel", "128", "128"], "bench.yaml: a bench has the panel that its file says"),
     ],
 )
 def test_what_cannot_be_is_one_line(
@@ -82,6 +83,7 @@ def test_what_cannot_be_is_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
+    Path("bench.yaml").write_text("name: mine\nslm: {}\n")
     monkeypatch.setattr("sys.argv", ["holoeval", "twin", *arguments])
     with pytest.raises(SystemExit) as ended:
         main()

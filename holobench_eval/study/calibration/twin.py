@@ -39,6 +39,8 @@ PHOTOGRAPHS, TRIAL = "photographs", "trial"  # in the folder of a twin: two stud
 TURNED, BLANK = "turned", "blank"  # displays that a twin has to be better than
 OVER_PANEL = ("lut.gain", "illumination.amplitude", "illumination.phase")
 NOISY = 4  # pictures that tell the noise of a camera
+SCORE = "psnr_linear"
+FEWEST = 3  # pictures, and methods: two without a camera, whose difference is compared, and the twin
 
 
 def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
@@ -107,7 +109,9 @@ class Photographed:
         if record is None or record.state != "done" or not kept:
             state = "waits for its photograph" if record is None else record.reason or "has lost its capture"
             raise UserError(f"{self.output}: {cell.method} on {cell.target} {state}; a twin needs every cell")
-        return kept[0], record.values()["psnr_linear"]
+        if SCORE not in record.values():
+            raise UserError(f"{self.study.file}: measures no psnr; a twin is told by it")
+        return kept[0], record.values()[SCORE]
 
     def target(self, item: str) -> Tensor:
         """A picture ``(C, h, w)`` of linear light, as the display is to show it."""
@@ -185,6 +189,10 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     Of ``turned`` the maps over the panel are turned by half a turn, ``blank`` has no maps. The camera's noise is that
     of two photographs. Returns the profile of the twin, whose maps are in ``folder / TRIAL``.
     """
+    (cells,) = photographed.cells().values()
+    for kind, found in zip(("methods", "pictures"), map(set, zip(*cells, strict=True)), strict=True):
+        if len(found) < FEWEST:
+            raise UserError(f"{photographed.study.file}: {len(found)} {kind}; a twin is tried on {FEWEST} or more")
     trial = folder / TRIAL
     base = nominal(name, photographed)
     model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
