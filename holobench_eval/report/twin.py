@@ -36,8 +36,8 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             heading("The same holograms on both"),
             _methods(found),
             f"PSNR in linear light, means over {len(found.pictures)} pictures that the twin did not learn from, with "
-            "95 % intervals. Further: the error of a capture of the twin over that of a second photograph, both "
-            "against the first photograph.",
+            "95 % intervals. Against a photograph: of a capture of the twin. Further: how much higher that of a second "
+            "photograph is, which differs by noise alone; of all colours, and of each.",
             Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
             "Pale: the twin with its maps turned by half a turn (x), and without maps (+).",
             heading("Beside twins that know less"),
@@ -81,7 +81,15 @@ def _signed(estimate: Estimate) -> str:
 def _methods(found: Trial) -> Markdown:
     colours = next(iter(found.twin.values())).gaps.shape[1] - 1
     names = COLOURS if colours == len(COLOURS) else COLOURS[:0]
-    head = ["method", "display [dB]", "twin [dB]", "twin less display [dB]", "further [dB]", *names]
+    head = [
+        "method",
+        "display [dB]",
+        "twin [dB]",
+        "twin less display [dB]",
+        "against a photograph [dB]",
+        "further [dB]",
+        *names,
+    ]
     order = sorted(found.display, key=lambda label: -float(found.display[label].mean()))
     lines = []
     for label in order:
@@ -89,7 +97,8 @@ def _methods(found: Trial) -> Markdown:
         gaps = shown.gaps.mean(0)[: 1 + len(names)]
         named = f"{label} (flattery)" if label == found.label else label
         means = [f"{values.mean():.2f}" for values in (scores, shown.scores)]
-        lines.append([named, *means, _signed(found.difference(label)), *(f"{gap:.2f}" for gap in gaps)])
+        likeness = f"{shown.likeness[:, 0].mean():.1f}"
+        lines.append([named, *means, _signed(found.difference(label)), likeness, *(f"{gap:.2f}" for gap in gaps)])
     return table(head, lines)
 
 

@@ -22,10 +22,12 @@ DARKEST = 1e-9  # mean square that no difference falls below, where a display ha
 
 @dataclass(frozen=True)
 class Shown:
-    """Holograms of a method on one display: scores ``(pictures,)`` [dB], and how much further captures there are from a
-    photograph than a second photograph is, ``(pictures, 1 + colours)`` [dB], all colours first."""
+    """Holograms of a method on one display: scores ``(pictures,)`` [dB]; and, ``(pictures, 1 + colours)`` with all
+    colours first, PSNR of captures there against a photograph, and how much lower that is than that of a second
+    photograph [dB]."""
 
     scores: NDArray[np.float64]
+    likeness: NDArray[np.float64]
     gaps: NDArray[np.float64]
 
 
@@ -122,8 +124,12 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
         display[label] = np.array([np.mean([score for _, score in shots]) for shots in own.values()])
         for each, shown in twins.items():
             others = {item: trial.captures(on_twins[each][label, item][0]) for item in pictures}
-            gaps = [further(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures]
-            shown[label] = Shown(np.array([score for _, score in others.values()]), torch.stack(gaps).numpy())
+            likeness, gaps = zip(
+                *(further(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures),
+                strict=True,
+            )
+            scores = np.array([score for _, score in others.values()])
+            shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
     learned = photographed.learned.provenance["captures"]
     return Trial(name, photographed.display.name, photographed.label, learned, pictures, display, twins)
 
@@ -157,13 +163,14 @@ class Noise:
         return (self.coefficients * means).sum(1).clamp_min(0)
 
 
-def further(photograph: Tensor, capture: Tensor, target: Tensor, noise: Noise) -> Tensor:
-    """How much further a capture ``(C, h, w)`` is from a photograph than a second photograph would be, ``(1 + C,)``
-    [dB], all colours first. The photograph is matched to the target, and the capture to the photograph."""
+def further(photograph: Tensor, capture: Tensor, target: Tensor, noise: Noise) -> tuple[Tensor, Tensor]:
+    """PSNR of a capture ``(C, h, w)`` against a photograph, and how much lower that is than a second photograph's would
+    be, each ``(1 + C,)`` [dB] with all colours first. The photograph is matched to the target, and the capture to the
+    photograph."""
     factors = match(photograph, target)[1]
     first = photograph * factors[:, None, None]  # not clipped, as noise is not
     apart = capture * match(capture, first)[1][:, None, None] - first
     second = (2 * noise(photograph) * factors.double().square()).clamp_min(DARKEST)
     other = apart.double().square().mean((-2, -1)).clamp_min(DARKEST)
-    ratios = torch.cat([(other.mean() / second.mean())[None], other / second])
-    return 10 * ratios.log10()
+    likeness, bound = (-10 * torch.cat([each.mean()[None], each]).log10() for each in (other, second))
+    return likeness, bound - likeness

@@ -14,6 +14,7 @@ from holobench_eval.display.simulated.trust import Trust
 from holobench_eval.report.data.twin import Noise, Shown, Trial, further
 
 SHAPE = (3, 96, 128)
+LIKE = np.full((3, 4), 35.0)
 
 
 def draw(seed: int) -> torch.Generator:
@@ -43,15 +44,16 @@ def test_a_capture_is_further_than_a_second_photograph_by_its_error(light: Tenso
     twin = photograph(light + error * torch.randn(SHAPE, generator=draw(5)), 6, factor=3.0)
     variance = noise(light).mean()
     wanted = 10 * math.log10(1 + error**2 / (2 * float(variance)))
-    told = further(first, twin, light, noise)
+    likeness, told = further(first, twin, light, noise)
+    assert float((likeness + told)[0]) == pytest.approx(-10 * math.log10(2 * float(variance)), abs=0.05)
     assert told.tolist() == pytest.approx([wanted] * 4, abs=0.2)  # the match takes a little of any error
 
 
 def trial() -> Trial:
     display = {"good": np.array([20.0, 22.0, 24.0]), "bad": np.array([18.0, 19.0, 20.0]), "own": np.full(3, 30.0)}
-    shown = {label: Shown(scores + 0.5, np.ones((3, 4))) for label, scores in display.items()}
-    own = {**shown, "own": Shown(display["own"] + np.array([1.0, 2.0, 3.0]), np.full((3, 4), 2.0))}
-    turned = {**shown, "bad": Shown(display["bad"] + 9, np.ones((3, 4)))}
+    shown = {label: Shown(scores + 0.5, LIKE, np.ones((3, 4))) for label, scores in display.items()}
+    own = {**shown, "own": Shown(display["own"] + np.array([1.0, 2.0, 3.0]), LIKE, np.full((3, 4), 2.0))}
+    turned = {**shown, "bad": Shown(display["bad"] + 9, LIKE, np.ones((3, 4)))}
     return Trial("lab", "bench", "own", 59, ("a", "b", "c"), display, {"lab": own, "lab-turned": turned})
 
 
