@@ -20,6 +20,7 @@ from .markdown import Markdown, blocks, bullets, code, heading, table
 from .sections.diagnosis import quantities
 
 COLOURS = ("red", "green", "blue")
+COLUMNS = ("display", "twin", "twin less display", "against a photograph", "further")
 PICTURES, SCORES = "pictures.jpg", "scores.png"
 
 
