@@ -96,7 +96,7 @@ class Twin(ThroughModel):
         self, bench: TrainingBench, learned: Mapping[str, Any], samples: Sequence[Sample], number: int
     ) -> dict[str, Any]:
         """What a twin learns that goes on from what it has learned with these samples alone."""
-        again, steps = self.approximator(bench.spec).to(bench.device), self.training.refine_steps
+        again, steps = self.approximator(bench.spec).to(bench.device), max(1, self.training.refine_steps // 2)
         again.load_learned(learned)
         draw, passes = bench.generator("half", number), -(-steps // len(samples))
         order = torch.cat([torch.randperm(len(samples), generator=draw) for _ in range(passes)]).tolist()
