@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -35,7 +35,7 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True)
 class LearnedBench(MethodHandles):
-    """A display without noise, camera or registration; ``method`` predicts on ``device`` with what it ``learned``."""
+    """A display without noise or registration; ``method`` predicts on ``device`` with what it ``learned``."""
 
     spec: DisplaySpec
     method: Predictor
@@ -65,9 +65,24 @@ class LearnedBench(MethodHandles):
         )
 
     def session(self, names: tuple[object, ...], target: Tensor) -> Camera:
-        """There is none: a learned display has no camera."""
-        raise CellError("a learned display has no camera")
+        """A camera that sees what is predicted, without noise, so that nothing depends on ``names``."""
+        return LearnedCamera(self, target)
 
     def rectified(self, capture: Capture, target: Tensor) -> Tensor:
         """A predicted capture is in the target's frame already."""
         return capture.linear()
+
+
+@dataclass(frozen=True)
+class LearnedCamera:
+    """The camera of a learned display, exposed for a target ``(C, h, w)``."""
+
+    display: LearnedBench
+    target: Tensor
+
+    def announce(self, phases: Sequence[Tensor]) -> None:
+        """Nothing: a network is always ready."""
+
+    def capture(self, phase: Tensor) -> Capture:
+        """The predicted capture of ``phase`` ``(C, H, W)`` [rad]."""
+        return self.display.photograph(phase, self.target, "camera", 0).capture

@@ -78,7 +78,7 @@ def _learned(condition: Condition, profile: str) -> Display:
     assert network is not None
     return Display(
         name=condition.name,
-        heading=f"The frozen network of {network.method}, trained on captures of {profile}; no noise, no camera.",
+        heading=f"The frozen network of {network.method}, trained on captures of {profile}; no noise.",
         lines=(f"artifact: {network.name}", f"parameters: {plain(dict(network.params))}"),
     )
 

@@ -49,9 +49,14 @@ def test_a_capture_does_not_depend_on_repeat_or_exposure_and_may_be_an_array_of_
     assert torch.equal(first, LearnedBench(SPEC, Array(), display.learned, 3).photograph(PHASE, TARGET, "t", 0).image)
 
 
-def test_a_method_is_told_that_there_is_no_camera_and_no_bench_to_look_into(display):
-    with pytest.raises(CellError, match=r"^a learned display has no camera$"):
-        display.for_method(Camera(), "camera", TARGET, "t", 0).capture(PHASE)
+def test_a_method_with_a_camera_sees_what_is_predicted_and_is_counted(display):
+    handle = display.for_method(Camera(), "camera", TARGET, "t", 0)
+    image = handle.rectify(handle.capture(PHASE))
+    assert torch.equal(image.cpu(), display.photograph(PHASE, TARGET, "t", 0).image)
+    assert handle.captures == 1
+
+
+def test_a_method_is_told_that_it_has_no_camera_and_that_there_is_no_bench_to_look_into(display):
     with pytest.raises(CellError, match="blind took a capture, but declares no camera"):  # its own mistake comes first
         display.for_method(object(), "blind", TARGET, "t", 0).capture(PHASE)
     with pytest.raises(CellError, match=r"^a learned display has no simulated bench to look into$"):

@@ -23,7 +23,6 @@ def test_methods_are_shown_on_a_display_that_was_learned(tmp_path: Path) -> None
     found = {record["label"]: record for record in outcome.records}
     reasons = {label: (record["state"], record["reason"]) for label, record in found.items()}
     assert reasons == dict.fromkeys(reasons, ("done", "")) | {
-        "Capturing": ("failed", "a learned display has no camera"),
         "Peeking": ("failed", "a learned display has no simulated bench to look into"),
     }
     assert {record["cell"]["condition"] for record in outcome.records} == {"reference", "Gain trained on ideal"}
