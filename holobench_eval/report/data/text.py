@@ -109,7 +109,7 @@ ON_A_NETWORK = Text(
         "The scores measure how well a method exploits the network, which may predict what no display would show. "
         "Whether a bench shows the same is a question for another study."
     ),
-    displays="The display is a trained, frozen network; there is no bench, no camera and no noise.",
+    displays="The display is a trained, frozen network; there is no bench and no noise.",
     picture="Each predicted capture is matched in intensity and sRGB-encoded",
 )
 
