@@ -26,7 +26,11 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
     def text(display: str, panel: tuple[int, int], pictures: int) -> str:
         config = yaml.safe_load(whole(display, panel, pictures))
-        config["methods"] = ["double_phase", "wirtinger", {"name": "twin", "params": QUICK["twin"]}]
+        config["methods"] = [
+            "double_phase",
+            {"name": "wirtinger", "params": {"iterations": 3}},
+            {"name": "twin", "params": QUICK["twin"]},
+        ]
         config["training"]["params"]["count"] = 4
         config["protocol"]["metrics"] = ["psnr"]
         return yaml.safe_dump(config)
@@ -57,9 +61,6 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert basis(profile).startswith(
         f"simulated, a twin of leto-aged, learned from {photographs} photographs: its captur"
     )
-    before = Path("lab/lab.yaml").read_bytes(), Path("lab/report.md").read_bytes()
-    twin("leto-aged", Path("lab"), panel=PANEL, pictures=3)  # nothing is left to do
-    assert (Path("lab/lab.yaml").read_bytes(), Path("lab/report.md").read_bytes()) == before
     with pytest.raises(UserError, match=r"^lab: holds the twin of another display or of other settings"):
         twin("ideal", Path("lab"), panel=PANEL, pictures=3)
 
