@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Literal, Protocol
 
@@ -31,6 +32,31 @@ class Bench(Protocol):
 
     def solved(self, method: Any, target: Tensor) -> Tensor:
         """Phases ``(B, C, H, W)`` [rad] by another method without camera, solved once where phases are kept."""
+
+
+class ByColour(ABC):
+    """A method that solves the colours of a target one after the other, each at its wavelength."""
+
+    def solve(self, target: Tensor, bench: Bench) -> Tensor:
+        """Phases by `retrieve`.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
+        """
+        return per_channel(target, lambda image, channel: self.retrieve(image, bench, channel))
+
+    @abstractmethod
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """One colour: linear intensity ``(B, h, w)`` to phase ``(B, H, W)`` or frames ``(B, F, H, W)`` [rad]."""
 
 
 def per_channel(target: Tensor, solve_channel: Callable[[Tensor, int], Tensor]) -> Tensor:

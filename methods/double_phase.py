@@ -14,11 +14,11 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ..optics.convolution import frequencies, iris
-from .common import Bench, Offset, nominal_model, per_channel, with_offset
+from .common import Bench, ByColour, Offset, nominal_model, with_offset
 
 
 @dataclass(frozen=True)
-class DoublePhase:
+class DoublePhase(ByColour):
     """Double phase amplitude coding (Maimone et al. 2017).
 
     The image plane holds the target amplitude with constant phase, and black outside the region. SI units throughout.
@@ -38,28 +38,9 @@ class DoublePhase:
 
     title: ClassVar[str] = "double-phase encoding"
     fresnel: ClassVar[bool] = True
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The complex field at the panel that gives the target, encoded without iteration.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self.solve_channel(image, bench, channel))
-
-    def solve_channel(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
-        """One colour: linear intensity ``(B, h, w)`` to phase ``(B, H, W)`` [rad]."""
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The complex field at the panel that gives the target, encoded without iteration."""
         spec = bench.spec
         amplitude = spec.region.embed(target.clamp_min(0).sqrt(), spec.shape)
         at_image = torch.complex(amplitude, torch.zeros_like(amplitude))

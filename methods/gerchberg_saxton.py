@@ -14,12 +14,12 @@ from torch import Tensor
 
 from ..display.api import Region
 from ..optics import Propagator
-from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .common import Bench, ByColour, Offset, nominal_model, unit_field, with_offset
 from .initial_phase import InitialPhase, initial_phase
 
 
 @dataclass(frozen=True)
-class GerchbergSaxton:
+class GerchbergSaxton(ByColour):
     """Alternate between the target amplitude in the region and unit amplitude at the panel.
 
     Light outside the region is free: whatever falls there is kept. The target's brightness is set once, so that
@@ -44,27 +44,9 @@ class GerchbergSaxton:
 
     title: ClassVar[str] = "Gerchberg-Saxton"
     version: ClassVar[int] = 2
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase after the last iteration, whose error is the least (Gerchberg & Saxton 1972).
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase after the last iteration, whose error is the least (Gerchberg & Saxton 1972)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         phase = initial_phase(self.initial_phase, target, bench, channel)
         amplitude = as_bright(target, phase, model, region)

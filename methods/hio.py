@@ -13,13 +13,13 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .common import Bench, ByColour, Offset, nominal_model, unit_field, with_offset
 from .gerchberg_saxton import as_bright
 from .initial_phase import InitialPhase, initial_phase
 
 
 @dataclass(frozen=True)
-class HybridInputOutput:
+class HybridInputOutput(ByColour):
     """Hybrid input-output (Fienup 1982): the panel is driven with an input image that over-corrects the target.
 
     Fienup's two planes map as follows. The Fourier modulus, which is known exactly, is the unit amplitude of
@@ -49,27 +49,9 @@ class HybridInputOutput:
 
     title: ClassVar[str] = "hybrid input-output"
     version: ClassVar[int] = 2
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase of the least error of amplitude that was seen (Fienup 1982).
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase of the least error of amplitude that was seen (Fienup 1982)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         phase = initial_phase(self.initial_phase, target, bench, channel)
         amplitude = as_bright(target, phase, model, region)

@@ -28,7 +28,7 @@ def initial_phase(kind: InitialPhase, target: Tensor, bench: Bench, channel: int
     spec = bench.spec
     if kind == "dpe":
         refuse_plane(traits_of(DoublePhase), "initial_phase: dpe", spec)
-        return DoublePhase(offset="none").solve_channel(target, bench, channel)
+        return DoublePhase(offset="none").retrieve(target, bench, channel)
     if kind in ("random", "narrow"):
         draw = torch.rand(spec.shape, generator=bench.generator("initial phase", channel), dtype=torch.float64)
         phase = (draw * (TAU if kind == "random" else 1.0)).to(target.device, target.dtype)

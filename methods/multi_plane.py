@@ -54,8 +54,6 @@ class MultiPlane:
 
     title: ClassVar[str] = "descent for all planes"
     version: ClassVar[int] = 2
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     planes: ClassVar[bool] = True
     fresnel: ClassVar[bool] = True
 

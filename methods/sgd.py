@@ -12,14 +12,14 @@ from typing import Annotated, ClassVar
 from annotated_types import Interval
 from torch import Tensor
 
-from .common import Bench, Offset, nominal_model, per_channel, unit_field, with_offset
+from .common import Bench, ByColour, Offset, nominal_model, unit_field, with_offset
 from .descent import adam, by_autograd
 from .initial_phase import InitialPhase, initial_phase
 from .losses import amplitude_l2
 
 
 @dataclass(frozen=True)
-class AmplitudeSGD:
+class AmplitudeSGD(ByColour):
     """Adam on the phase for the squared error of amplitude in the region; light outside it is free.
 
     One departure from the paper: the scale between the amplitudes is the closed-form optimum of each iteration,
@@ -45,27 +45,9 @@ class AmplitudeSGD:
     offset: Offset = "centre"
 
     title: ClassVar[str] = "gradient descent on amplitude"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase of the least loss that was seen (Peng et al. 2020).
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase of the least loss that was seen (Peng et al. 2020)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
 
         def loss(phase: Tensor) -> Tensor:

@@ -88,8 +88,6 @@ class Wirtinger:
         "the starting phase and global offset were chosen on the display ideal and, in part, on an earlier leto-aged, "
         "with photographs that are cropped for the targets of most studies"
     )
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """Phases of least loss in the image of the nominal model (Chakravarthula et al. 2020, Eq. 12).

@@ -69,8 +69,6 @@ class ThroughModel(ABC):
     seed: int = 0
     fallback: bool = False
 
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     fresnel: ClassVar[bool] = True
     version: ClassVar[int] = 3

@@ -53,8 +53,6 @@ class PhaseGamma(ABC):
 
     images: Annotated[int, Interval(ge=1, le=100)] = 3
 
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
 
     @property

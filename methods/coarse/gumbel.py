@@ -15,7 +15,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ...optics.phase import TAU
-from ..common import Bench, nominal_model, per_channel, unit_field
+from ..common import Bench, ByColour, nominal_model, unit_field
 from ..descent import Adam, by_autograd
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import intensity_l2
@@ -25,7 +25,7 @@ LEAST = 1e-9  # of a uniform random number: its double logarithm is finite
 
 
 @dataclass(frozen=True)
-class Gumbel:
+class Gumbel(ByColour):
     """Adam on a phase that gives each pixel a soft choice among the panel's levels (Gumbel-softmax).
 
     A level's score falls with its distance from the phase; a softmax of score and Gumbel noise over a temperature
@@ -67,27 +67,9 @@ class Gumbel:
 
     title: ClassVar[str] = "annealed descent on levels, Choi 2022"
     tuned: ClassVar[str] = "score, temperatures and step: on an ideal panel of two levels, with two photographs"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Phases that show the levels which the relaxation ends in.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """Phases that show the levels which the relaxation ends in."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         levels, draw = Levels(bench.spec, channel, target), bench.generator("gumbel", channel)
         start = initial_phase(self.initial_phase, target, bench, channel)

@@ -29,8 +29,6 @@ class NearestLevel:
     start: Wirtinger = Wirtinger()
 
     title: ClassVar[str] = "Wirtinger holography on the nearest levels"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
         """Phases that show the nearest levels.

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 from annotated_types import Interval
 from torch import Tensor
 
-from ..common import Bench, nominal_model, per_channel, unit_field
+from ..common import Bench, ByColour, nominal_model, unit_field
 from ..descent import adam, by_autograd
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import intensity_l2
@@ -20,7 +20,7 @@ from .levels import Levels
 
 
 @dataclass(frozen=True)
-class StraightThrough:
+class StraightThrough(ByColour):
     """Adam on a phase whose nearest levels make the image, as if rounding had the slope of one.
 
     The levels of the least loss that was seen are returned. On two levels it may end with a flat panel and no picture:
@@ -42,27 +42,9 @@ class StraightThrough:
     initial_phase: InitialPhase = "constant"
 
     title: ClassVar[str] = "straight-through descent on levels"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Phases that show the levels of least loss in the image of the nominal model.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """Phases that show the levels of least loss in the image of the nominal model."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         levels = Levels(bench.spec, channel, target)
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from ...display.api import DisplaySpec
 from ...optics.phase import blaze, wrap
 from ...optics.phasor import squared_modulus
-from ..common import Bench, per_channel, unit_field, with_offset
+from ..common import Bench, ByColour, unit_field, with_offset
 from ..descent import adam, by_autograd
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import intensity_l2
@@ -37,7 +37,7 @@ def stroke(wavelength: float, offset: float) -> float:
 
 
 @dataclass(frozen=True)
-class PartiallyCoherent:
+class PartiallyCoherent(ByColour):
     """Adam on the phase for the light of all lines of the source, whose intensities add up; the source is a point.
 
     Each line meets the panel with a phase in proportion to 1 / wavelength and has a propagation of its own. Where the
@@ -61,27 +61,10 @@ class PartiallyCoherent:
     initial_phase: InitialPhase = "constant"
 
     title: ClassVar[str] = "descent through the spectrum, Peng 2021"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase of the least squared error of intensity that was seen.
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase of the least squared error of intensity that was seen."""
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         def loss(phase: Tensor) -> Tensor:
             return intensity_l2(bench.spec.region.crop(intensity(phase, bench.spec, channel)), target)
 

@@ -105,8 +105,6 @@ class Phases:
 
     title: ClassVar[str] = "phases from files"
     version: ClassVar[int] = 2
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     timed: ClassVar[bool] = False  # reading is no solving
 
     def __post_init__(self) -> None:

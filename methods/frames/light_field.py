@@ -10,6 +10,7 @@ realism", ACM Trans. Graph. 43(4), 68 (2024).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -19,14 +20,13 @@ from torch import Tensor
 
 from ...display.api import DisplaySpec
 from ...optics.convolution import frequencies, iris
-from ..common import Bench, nominal_model, per_channel, unit_field
-from ..descent import adam, by_autograd
+from ..common import Bench, nominal_model, unit_field
 from ..losses import intensity_l2
-from .random_frames import random_start
+from .random_frames import FromRandomFrames
 
 
 @dataclass(frozen=True)
-class LightField:
+class LightField(FromRandomFrames):
     """Adam on frames that start from random phases, for the squared error of the light field of a flat picture.
 
     The light field is what an eye sees whose pupil is in the middle of the iris, or on one of the rings around it:
@@ -34,49 +34,21 @@ class LightField:
 
     Parameters
     ----------
-    frames : int
-        Frames of a hologram, which share one exposure.
     rings : int
         Rings of places, evenly up to half of the iris' radius; the k-th has 6 k places. Between places that are far
         apart no loss holds the picture.
     pupil : float
         Diameter of the eye's pupil, as a share of the iris'.
-    iterations : int
-        Evaluations of loss and gradient, of all frames and views.
-    step : float
-        Adam's step [rad].
     """
 
-    frames: Annotated[int, Interval(ge=1, le=256)] = 1
     rings: Annotated[int, Interval(ge=0, le=8)] = 2
     pupil: Annotated[float, Interval(gt=0, le=1)] = 0.5
-    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
-    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
 
     title: ClassVar[str] = "frames of random phase for a light field, Choi 2022"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     fresnel: ClassVar[bool] = True
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The frames of the least loss that was seen (Choi et al. 2022, the loss of light fields).
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
-        """Phase ``(B, H, W)`` or frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+        """The squared error of all views (Choi et al. 2022, the loss of light fields)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         pupils = self._pupils(bench.spec).to(target.device, target.dtype)
         wanted = target.repeat(1, len(pupils), 1)  # views one under another, so that one factor is for all of them
@@ -86,9 +58,7 @@ class LightField:
             seen = (region.crop(torch.fft.ifft2(spectrum * pupil)).abs().square().mean(1) for pupil in pupils)
             return intensity_l2(torch.cat(list(seen), dim=-2), wanted).repeat_interleave(self.frames)
 
-        start = random_start(self.frames, target, bench, channel)
-        frames = adam(start, by_autograd(loss), self.iterations, self.step)
-        return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
+        return loss
 
     def _pupils(self, spec: DisplaySpec) -> Tensor:
         """Amplitude ``(V, H, W)`` of the eye's pupil at every place, over the frequencies of the image."""

@@ -7,6 +7,8 @@ Chen & Lee, "High-contrast, speckle-free, true 3D holography via binary CGH opti
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -15,13 +17,44 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ...optics.phase import TAU
-from ..common import Bench, nominal_model, per_channel, unit_field
+from ..common import Bench, ByColour, nominal_model, unit_field
 from ..descent import adam, by_autograd
 from ..losses import intensity_l2
 
 
 @dataclass(frozen=True)
-class RandomFrames:
+class FromRandomFrames(ByColour):
+    """Adam on frames that start from random phases of their own; a subclass gives the loss. SI units throughout.
+
+    Parameters
+    ----------
+    frames : int
+        Frames of a hologram, which share one exposure.
+    iterations : int
+        Evaluations of loss and gradient, of all frames.
+    step : float
+        Adam's step [rad].
+    """
+
+    frames: Annotated[int, Interval(ge=1, le=256)] = 1
+    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
+
+    @abstractmethod
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+        """The loss ``(B F,)`` of phases ``(B F, H, W)`` [rad] for a target ``(B, h, w)``."""
+
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The frames of the least loss that was seen."""
+        draw = bench.generator("random frames", channel)
+        start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
+        start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # the same for all of a batch
+        frames = adam(start, by_autograd(self.loss(target, bench, channel)), self.iterations, self.step)
+        return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
+
+
+@dataclass(frozen=True)
+class RandomFrames(FromRandomFrames):
     """Adam on frames that start from random phases of their own, for the squared error of intensity in the region.
 
     A random phase spreads the light of every point of the picture over the whole iris, so that an eye sees the picture
@@ -31,44 +64,16 @@ class RandomFrames:
 
     Parameters
     ----------
-    frames : int
-        Frames of a hologram, which share one exposure.
     together : bool
         The loss is that of the frames' mean intensity (true), or each frame has its own (false).
-    iterations : int
-        Evaluations of loss and gradient, of all frames.
-    step : float
-        Adam's step [rad].
     """
 
-    frames: Annotated[int, Interval(ge=1, le=256)] = 1
     together: bool = True
-    iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
-    step: Annotated[float, Interval(gt=0, le=10)] = 0.1
 
     title: ClassVar[str] = "frames of random phase, Choi 2022"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The frames of the least loss that was seen (Choi et al. 2022, Lee et al. 2022).
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)``, or of several frames ``(B, F, C, H, W)`` [rad].
-        """
-        return per_channel(target, lambda image, channel: self._retrieve(image, bench, channel))
-
-    def _retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
-        """Phase ``(B, H, W)`` or frames ``(B, F, H, W)`` [rad] for a target ``(B, h, w)``."""
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+        """The squared error of the mean of all frames, or of each (Choi et al. 2022, Lee et al. 2022)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         shared = self.frames if self.together else 1  # frames that a loss is of
         wanted = target.repeat_interleave(self.frames // shared, dim=0)
@@ -77,13 +82,4 @@ class RandomFrames:
             light = region.crop(model.forward(unit_field(phase))).abs().square()
             return intensity_l2(light.unflatten(0, (-1, shared)).mean(1), wanted).repeat_interleave(shared)
 
-        start = random_start(self.frames, target, bench, channel)
-        frames = adam(start, by_autograd(loss), self.iterations, self.step)
-        return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
-
-
-def random_start(frames: int, target: Tensor, bench: Bench, channel: int) -> Tensor:
-    """Phases ``(B F, H, W)``, uniform over 2 pi [rad], for targets ``(B, h, w)``: the same for all of a batch."""
-    draw = bench.generator("random frames", channel)
-    start = TAU * torch.rand((frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
-    return start.to(target.device, target.dtype).repeat(len(target), 1, 1)
+        return loss

@@ -71,8 +71,6 @@ class HIL:
         "the network (a quarter of the paper's filters, 1,300 steps for 40,000), rates and steps were chosen on a "
         "trial display that resembles leto-hazy, with generated images"
     )
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 4
 

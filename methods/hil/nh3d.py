@@ -61,8 +61,6 @@ class HILNH3D:
     fallback: bool = False
 
     title: ClassVar[str] = "hardware in the loop, as Choi 2021 compares"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 3
 

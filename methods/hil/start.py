@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import torch
 from annotated_types import Interval
@@ -36,9 +36,6 @@ class SmoothStart(Wirtinger):
 
     tolerance: Annotated[float, Interval(ge=0, le=1)] = 0.0
     constant: float = 0.0
-
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.tolerance and (self.optimiser, self.loss) != ("adam", "intensity_l2"):

@@ -62,8 +62,6 @@ class OnePass(ABC):
     calibration: ParametricModel = ParametricModel()
     offset: Offset = "centre"
 
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
 
     def external(self) -> dict[str, Path | None]:

@@ -60,7 +60,6 @@ class OnlineCamera:
     title: ClassVar[str] = "camera in the loop"
     version: ClassVar[int] = 2
     camera: ClassVar[bool] = True
-    privileged: ClassVar[bool] = False
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phases of least captured error.

@@ -80,7 +80,6 @@ class OnlineCameraNetwork:
 
     title: ClassVar[str] = "camera in the loop through a network"
     camera: ClassVar[bool] = True
-    privileged: ClassVar[bool] = False
     version: ClassVar[int] = 2
 
     def external(self) -> dict[str, Path | None]:

@@ -17,12 +17,12 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ..common import Bench, per_channel
+from ..common import Bench, ByColour
 from .loading import load, unavailable
 
 
 @dataclass(frozen=True)
-class OdakSGD:
+class OdakSGD(ByColour):
     """odak: Adam on the phase through odak's own propagation (needs the extra 'peers').
 
     odak compares the intensity of a panel lit with 1 with the image in [0, 1] as it is, without a factor between them,
@@ -46,41 +46,18 @@ class OdakSGD:
     learning_rate: Annotated[float, Interval(gt=0, le=10)] = 0.1
 
     title: ClassVar[str] = "gradient descent of odak"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     fresnel: ClassVar[bool] = True
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""
         return unavailable(_odak)
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase of odak's last iteration.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        UserError
-            Where odak is not installed.
-        """
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase of odak's last iteration; UserError where odak is not installed."""
         wave = _odak()
-        return per_channel(
-            target,
-            lambda images, channel: torch.stack([self._retrieve(wave, image, bench, channel) for image in images]),
-        )
+        return torch.stack([self._descend(wave, image, bench, channel) for image in target])
 
-    def _retrieve(self, wave: Any, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def _descend(self, wave: Any, target: Tensor, bench: Bench, channel: int) -> Tensor:
         spec = bench.spec
         region, wanted = spec.region, spec.region.embed(target, spec.shape)
 

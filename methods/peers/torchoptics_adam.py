@@ -14,7 +14,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ...display.api import DisplaySpec
-from ..common import Bench, per_channel
+from ..common import Bench, ByColour
 from ..descent import Best
 from ..initial_phase import InitialPhase, initial_phase
 from ..losses import LOSSES, LossName
@@ -22,7 +22,7 @@ from .loading import load, unavailable
 
 
 @dataclass(frozen=True)
-class TorchOpticsAdam:
+class TorchOpticsAdam(ByColour):
     """torchoptics: Adam on the phase through torchoptics' propagation (needs the extra 'peers').
 
     With the defaults it is ``wirtinger`` with another model of the light: the same loss in the region, start and
@@ -57,42 +57,19 @@ class TorchOpticsAdam:
     padding: Annotated[float, Interval(ge=0, le=4)] = 0.5
 
     title: ClassVar[str] = "Adam through TorchOptics"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     fresnel: ClassVar[bool] = True
 
     def available(self) -> str | None:
         """Why the method cannot run here, in one line; None if it can."""
         return unavailable(lambda: load("torchoptics"))
 
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """The phase of the least loss that was seen.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        UserError
-            Where torchoptics is not installed.
-        """
-        return per_channel(target, lambda images, channel: self._solve_channel(images, bench, channel))
-
-    def _solve_channel(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """The phase of the least loss that was seen; UserError where torchoptics is not installed."""
         start = initial_phase(self.initial_phase, target, bench, channel)
         pairs = zip(target, start, strict=True)
-        return torch.stack([self._retrieve(image, phase, bench.spec, channel) for image, phase in pairs])
+        return torch.stack([self._descend(image, phase, bench.spec, channel) for image, phase in pairs])
 
-    def _retrieve(self, target: Tensor, start: Tensor, spec: DisplaySpec, channel: int) -> Tensor:
+    def _descend(self, target: Tensor, start: Tensor, spec: DisplaySpec, channel: int) -> Tensor:
         """One image: target ``(h, w)``, start and result ``(H, W)`` [rad]; a modulator of torchoptics has one phase."""
         light, system = _display(start, spec, channel)
         pad = [round(self.padding * side) for side in spec.shape]

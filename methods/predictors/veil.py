@@ -52,8 +52,6 @@ class WirtingerVeil:
     offset: Offset = "centre"
 
     title: ClassVar[str] = "Wirtinger holography through a veil of two numbers"
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     trains: ClassVar[bool] = True
     version: ClassVar[int] = 2
     form: ClassVar[frozenset[str]] = frozenset({"stray_light"})

@@ -26,7 +26,6 @@ class Oracle(BenchDescent):
 
     title: ClassVar[str] = "descent through the display itself"
     version: ClassVar[int] = 3
-    camera: ClassVar[bool] = False
     privileged: ClassVar[bool] = True
     follows: ClassVar[bool] = True
 

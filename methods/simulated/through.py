@@ -51,8 +51,6 @@ class Through(BenchDescent):
 
     title: ClassVar[str] = "descent through a model of the display"
     version: ClassVar[int] = 1
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
     simulates: ClassVar[bool] = True
     _folder: ClassVar[Path] = Path()
 

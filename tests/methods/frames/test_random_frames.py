@@ -24,7 +24,7 @@ TARGET = Photographs(names=("camera",)).load("camera", SPEC.region.shape)[1:2].f
 
 @cache
 def frames(count: int, together: bool = False) -> Tensor:
-    return RandomFrames(count, together, iterations=100).solve(TARGET[None], Bench(SPEC))[0]
+    return RandomFrames(count, iterations=100, together=together).solve(TARGET[None], Bench(SPEC))[0]
 
 
 def quality(phase: Tensor) -> float:
