@@ -9,19 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-import torch
 from torch import Tensor
 
 from ...display.api import DisplaySpec
-from ...display.metered import MeteredDisplay
-from ...display.training import TrainingBench, TrainingImage
-from ..learned.algorithm import train
-from ..learned.fallback import WIRTINGER, fell_back
-from ..learned.method import frozen, hologram, predicted
+from ...display.training import TrainingBench
+from ..learned.loop import LearnedLoop
 from ..learned.retrieval import Image, SquaredErrorRetrieval, lpips_weights, retrieve
 from ..learned.samples import Schedule
 from ..wirtinger import Wirtinger
@@ -31,7 +26,7 @@ from .networks import Network
 
 
 @dataclass(frozen=True)
-class HILNH3D:
+class HILNH3D(LearnedLoop[NetworkApproximator]):
     """Ideal amplitude to captured amplitude by a U-Net, as Choi et al. 2021 compare with; SI units throughout.
 
     Parameters
@@ -46,10 +41,6 @@ class HILNH3D:
         Where every retrieval begins.
     rates : LearningRates
         Of Adam, while the network learns.
-    seed : int
-        Of the weights, besides the study's.
-    fallback : bool
-        Solve by plain Wirtinger holography where the loop made the captures of held-out images worse.
     """
 
     network: Network = Network(name="unet")
@@ -57,11 +48,8 @@ class HILNH3D:
     retrieval: SquaredErrorRetrieval = SquaredErrorRetrieval()
     start: Wirtinger = Wirtinger(iterations=50)
     rates: LearningRates = LearningRates(generator=1e-3, decay=True)
-    seed: int = 0
-    fallback: bool = False
 
     title: ClassVar[str] = "hardware in the loop, as Choi 2021 compares"
-    trains: ClassVar[bool] = True
     version: ClassVar[int] = 3
 
     def external(self) -> dict[str, Path | None]:
@@ -75,29 +63,10 @@ class HILNH3D:
         )
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:
-        """Train the network on captures of the display; parameters, result and errors as in `HIL.prepare`."""
-        approximator = self.approximator(bench.spec).to(bench.device)
-        start = partial(hologram, self.start, bench=bench)
-        train(bench, approximator, start, self._retrieve, self.training)
+        """See the base; its loss has no term that a region can be too small for."""
+        return {name: value for name, value in super().prepare(bench).items() if name != "left_out"}
 
-        def solve(image: TrainingImage) -> Tensor:
-            return self._retrieve(approximator.image(bench.light(image)), image.target, start(image))
-
-        return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve)}
-
-    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]; errors as in `HIL.solve`."""
-        if bench.learned["fell_back"]:
-            return bench.solved(WIRTINGER, target)
-        display = frozen(self.approximator(bench.spec), bench).image(bench.light)
-        start = bench.solved(self.start, target)
-        return torch.stack([self._retrieve(display, *pair) for pair in zip(target, start, strict=True)])
-
-    def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light, that the network expects."""
-        return predicted(frozen(self.approximator(bench.spec), bench).image(bench.light), phase)
-
-    def _retrieve(self, display: Image, target: Tensor, start: Tensor) -> Tensor:
+    def _retrieve(self, approximator: NetworkApproximator, display: Image, target: Tensor, start: Tensor) -> Tensor:
         def amplitude(phase: Tensor) -> Tensor:
             return display(phase).clamp_min(1e-12).sqrt()
 

@@ -13,6 +13,7 @@ from torch import Tensor
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display.metered import MeteredDisplay
+from holobench_eval.display.traits import traits_of
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.learned import fallback, retrieval
 from holobench_eval.methods.learned.retrieval import Image
@@ -39,7 +40,7 @@ NAMES = plugins.names("methods")
 CLASSES = {name: plugins.find("methods", name) for name in NAMES}
 TRAINED = [name for name in NAMES if getattr(CLASSES[name], "trains", False)]
 PREDICTING = [name for name in TRAINED if hasattr(CLASSES[name], "predict")]
-WITH_CAMERA = [name for name in NAMES if CLASSES[name].camera]
+WITH_CAMERA = [name for name in NAMES if traits_of(CLASSES[name]).camera]
 SPEC = replace(small_spec(48, 40, colours=3), shape=(48, 56))
 SPECS = {"through": modelled()}  # of a method that not every display will do for
 all_methods = pytest.mark.parametrize("name", NAMES)
@@ -145,10 +146,11 @@ def test_every_method_has_a_name_for_people_that_no_other_has() -> None:
 @all_methods
 def test_a_method_declares_what_it_uses_and_says_what_it_is(name: str) -> None:
     cls = CLASSES[name]
-    assert cls.privileged == (name == "oracle")
-    assert cls.camera == name.startswith("online_camera")
-    assert getattr(cls, "trains", False) == hasattr(cls, "prepare")
-    assert getattr(cls, "version", 1) >= 1
+    traits = traits_of(cls)
+    assert traits.privileged == (name == "oracle")
+    assert traits.camera == name.startswith("online_camera")
+    assert traits.trains == hasattr(cls, "prepare")
+    assert traits.version >= 1
     assert cls() == plugins.build("methods", name, {})
     assert cls.__doc__
     assert cls.__doc__.partition("\n")[0].strip()

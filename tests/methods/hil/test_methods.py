@@ -31,9 +31,13 @@ SHORT: dict[str, Any] = {
 PLAIN = PhaseRetrieval(iterations=2, perceptual=0.0, ms_ssim=0.0, adversarial=0.0)
 SMALL = Network(levels=2, width=4)
 METHODS: dict[str, Any] = {
-    "hil": HIL(SMALL, ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), **SHORT),
-    "hil_tuned": HILTuned(SMALL, ApproximatorLoss(l1=1.0, perceptual=0.0), retrieval=PLAIN, offsets=2, **SHORT),
-    "hil_nh3d": HILNH3D(Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
+    "hil": HIL(
+        network=SMALL, loss=ApproximatorLoss(perceptual=0.0), retrieval=replace(PLAIN, adversarial=0.1), **SHORT
+    ),
+    "hil_tuned": HILTuned(
+        network=SMALL, loss=ApproximatorLoss(l1=1.0, perceptual=0.0), retrieval=PLAIN, offsets=2, **SHORT
+    ),
+    "hil_nh3d": HILNH3D(network=Network("unet", levels=2, width=4), retrieval=PLAIN, **SHORT),
 }
 names = pytest.mark.parametrize("name", METHODS)
 
