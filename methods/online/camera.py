@@ -19,14 +19,14 @@ from ...display.metered import MeteredDisplay
 from ...metrics.base import gaussian_blur
 from ..common import matched, unit_field
 from ..descent import cosine_decay
-from .start import LEAST_SHARE, Camera, CameraStart, allowed
+from .start import Camera, OnlineLoop
 
 # Adam's decay rates. Little momentum: the gradient is that of another display.
 MOMENTS = (0.6, 0.99)
 
 
 @dataclass(frozen=True)
-class OnlineCamera:
+class OnlineCamera(OnlineLoop):
     """Adam on the phase for the captured intensity in the region, all colours in one capture.
 
     On an ideal display, and without smoothing, this is Wirtinger holography with more iterations. Chakravarthula et al.
@@ -34,8 +34,6 @@ class OnlineCamera:
 
     Parameters
     ----------
-    captures : int
-        In all, for the search of a start, the steps and the decision at the end.
     frames : int
         Captures that are averaged for each step.
     step : float
@@ -43,60 +41,25 @@ class OnlineCamera:
     smoothing : float
         Width [px] of the Gaussian that the captured error is filtered with: the ideal model knows least about the
         finest detail.
-    start : CameraStart
-        Not in the paper: the holograms that are tried first.
-    checks : int
-        Not in the paper: new captures in the end of each of the converged Wirtinger hologram, the one of the least
-        captured error and the last, between which they decide.
     """
 
-    captures: Annotated[int, Interval(ge=1, le=100_000)] = 200
     frames: Annotated[int, Interval(ge=1, le=100)] = 1
     step: Annotated[float, Interval(gt=0, le=10)] = 0.08
     smoothing: Annotated[float, Interval(ge=0, le=10)] = 0.7
-    start: CameraStart = CameraStart()
-    checks: Annotated[int, Interval(ge=1, le=100)] = 3
 
     title: ClassVar[str] = "camera in the loop"
-    version: ClassVar[int] = 2
-    camera: ClassVar[bool] = True
 
-    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of least captured error.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and a metered camera.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Without a camera.
-        """
-        return torch.stack([self._optimise(image, bench, len(target)) for image in target])
-
-    def _optimise(self, target: Tensor, bench: MeteredDisplay, images: int) -> Tensor:
-        """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
-        nominal = self.start.nominal(target, bench)
-        camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
-        checks = min(self.checks, camera.left // (3 * LEAST_SHARE))
-        phase = self.start.search(target, bench, camera, nominal)
+    def _optimise(
+        self, phase: Tensor, target: Tensor, bench: MeteredDisplay, camera: Camera, kept: int, index: int
+    ) -> Tensor:
         optimiser = torch.optim.Adam([phase], lr=self.step, betas=MOMENTS)
-        steps = (camera.left - 3 * checks) // self.frames
+        steps = (camera.left - kept) // self.frames
         for number in range(steps):
             capture = camera.show(phase, self.frames)
             phase.grad = self._gradient(phase, capture, target, bench.spec)
             optimiser.param_groups[0]["lr"] = cosine_decay(self.step, number / steps)
             optimiser.step()
-        return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
+        return phase
 
     def _gradient(self, phase: Tensor, capture: Tensor, target: Tensor, spec: DisplaySpec) -> Tensor:
         """Slope ``(C, H, W)`` of the squared error of intensity, as ``wirtinger.Objective`` has it.

@@ -22,7 +22,7 @@ from ..hil.approximator_loss import ApproximatorLoss, vgg_weights
 from ..hil.networks import Network
 from ..learned.retrieval import Image, SquaredErrorRetrieval, lpips_weights, retrieve
 from ..learned.samples import Sample
-from .start import LEAST_SHARE, Camera, CameraStart, allowed
+from .start import Camera, OnlineLoop
 
 # Width [px] of the Gaussian that what the network misses of the captures is filtered with.
 SMOOTHING = 0.7
@@ -37,7 +37,7 @@ class ShortRetrieval(SquaredErrorRetrieval):
 
 
 @dataclass(frozen=True)
-class OnlineCameraNetwork:
+class OnlineCameraNetwork(OnlineLoop):
     """Rounds of captures, refinement of the image's own network with all of them, and retrieval through it, held.
 
     Chakravarthula et al. 2020, Section 4.5; SI units throughout. Not in the paper: what the network still misses of a
@@ -61,11 +61,6 @@ class OnlineCameraNetwork:
         Eq. 20, of which the L1 term alone is worth its time in so few steps; null: the network's published loss.
     retrieval : ShortRetrieval
         Eq. 22, of which the squared error alone is used.
-    start : CameraStart
-        Not in the paper: the holograms that are tried first.
-    checks : int
-        Not in the paper: new captures in the end of each of the converged Wirtinger hologram, the one of the least
-        captured error and the last, between which they decide.
     """
 
     captures: Annotated[int, Interval(ge=1, le=100_000)] = 100
@@ -75,49 +70,19 @@ class OnlineCameraNetwork:
     network: Network = Network()
     loss: ApproximatorLoss | None = ApproximatorLoss(perceptual=0, adversarial=0)
     retrieval: ShortRetrieval = ShortRetrieval()
-    start: CameraStart = CameraStart()
-    checks: Annotated[int, Interval(ge=1, le=100)] = 3
 
     title: ClassVar[str] = "camera in the loop through a network"
-    camera: ClassVar[bool] = True
-    version: ClassVar[int] = 2
 
     def external(self) -> dict[str, Path | None]:
         """Files that it takes where a machine has them, by what they hold; None for one that is not there."""
         return {**lpips_weights(self.retrieval), **vgg_weights(self.network, self.loss)}
 
-    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of least captured error.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and a metered camera.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Without a camera.
-        """
-        pairs = enumerate(target)
-        return torch.stack([self._optimise(image, bench, len(target), index) for index, image in pairs])
-
-    def _optimise(self, target: Tensor, bench: MeteredDisplay, images: int, index: int) -> Tensor:
-        """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
-        nominal = self.start.nominal(target, bench)
-        camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
-        checks = min(self.checks, camera.left // (3 * LEAST_SHARE))
+    def _optimise(
+        self, phase: Tensor, target: Tensor, bench: MeteredDisplay, camera: Camera, kept: int, index: int
+    ) -> Tensor:
         draw = bench.generator("neighbours", index)
         approximator, samples = self._fresh(bench, draw), list[Sample]()
-        phase = self.start.search(target, bench, camera, nominal)
-        while camera.left - 3 * checks > self.neighbours:
+        while camera.left - kept > self.neighbours:
             shown = [phase, *(phase + self.perturbation * noise for noise in self._noise(phase, draw))]
             fresh = [Sample(one, camera.show(one), target, bench.light) for one in shown]
             if not samples:
@@ -127,7 +92,7 @@ class OnlineCameraNetwork:
                 chosen = int(torch.randint(len(samples), (), generator=draw))
                 approximator.step(samples[chosen], step / self.steps)
             phase = retrieve(corrected(approximator.image(bench.light), fresh), target, phase, self.retrieval)
-        return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
+        return phase
 
     def _fresh(self, bench: MeteredDisplay, draw: torch.Generator) -> NetworkApproximator:
         """An approximator that has seen nothing; D = Id."""

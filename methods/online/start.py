@@ -7,9 +7,10 @@ end is decided between few holograms with fresh frames.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import torch
 from annotated_types import Interval
@@ -126,3 +127,65 @@ class CameraStart:
 def allowed(captures: int, bench: MeteredDisplay, images: int) -> int:
     """Captures for each of so many images: as many as the method wants, within what the display allows for all."""
     return captures if bench.budget is None else min(captures, bench.budget // images)
+
+
+@dataclass(frozen=True)
+class OnlineLoop(ABC):
+    """Optimisation of each image with the camera, from the best of some starts to a decision by new captures.
+
+    Parameters
+    ----------
+    captures : int
+        In all, for the search of a start, the optimisation and the decision at the end.
+    start : CameraStart
+        Not in the paper: the holograms that are tried first.
+    checks : int
+        Not in the paper: new captures in the end of each of the converged Wirtinger hologram, the one of the least
+        captured error and the last, between which they decide.
+    """
+
+    captures: Annotated[int, Interval(ge=1, le=100_000)] = 200
+    start: CameraStart = CameraStart()
+    checks: Annotated[int, Interval(ge=1, le=100)] = 3
+
+    camera: ClassVar[bool] = True
+    version: ClassVar[int] = 2
+
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
+        """Phases of least captured error.
+
+        Parameters
+        ----------
+        target : Tensor
+            Linear intensity ``(B, C, h, w)`` in [0, 1].
+        bench : MeteredDisplay
+            Nominal optics in SI units, and a metered camera.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(B, C, H, W)`` [rad].
+
+        Raises
+        ------
+        CellError
+            Without a camera.
+        """
+        pairs = enumerate(target)
+        return torch.stack([self._solved(image, bench, len(target), index) for index, image in pairs])
+
+    def _solved(self, target: Tensor, bench: MeteredDisplay, images: int, index: int) -> Tensor:
+        """One image: target ``(C, h, w)`` to phase ``(C, H, W)``."""
+        nominal = self.start.nominal(target, bench)
+        camera = Camera(bench, target, nominal, allowed(self.captures, bench, images))
+        checks = min(self.checks, camera.left // (3 * LEAST_SHARE))
+        start = self.start.search(target, bench, camera, nominal)
+        phase = self._optimise(start, target, bench, camera, 3 * checks, index)
+        return camera.settle([nominal, camera.best, phase], checks) if checks else camera.best
+
+    @abstractmethod
+    def _optimise(
+        self, phase: Tensor, target: Tensor, bench: MeteredDisplay, camera: Camera, kept: int, index: int
+    ) -> Tensor:
+        """The last phase on the way from a start, both ``(C, H, W)`` [rad]. kept: captures that the decision takes;
+        index: of the image."""
