@@ -103,15 +103,16 @@ def available(network: Network = "alex", location: Path | None = None) -> str | 
     return None
 
 
-def _state(path: Path) -> dict[str, Tensor]:
-    """A dictionary of tensors from a file, read without running anything in it."""
+def read_weights(path: Path, owner: str = "LPIPS weights") -> dict[str, Tensor]:
+    """A dictionary of tensors from a file, read without running anything in it. UserError, which begins with ``owner``,
+    for a file that is none."""
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except (pickle.UnpicklingError, RuntimeError, EOFError, OSError, ValueError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise UserError(f"LPIPS weights: {path} cannot be read as a state dict: {reason}") from error
+        raise UserError(f"{owner}: {path} cannot be read as a state dict: {reason}") from error
     if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
-        raise UserError(f"LPIPS weights: {path} is not a state dict of tensors; download it again")
+        raise UserError(f"{owner}: {path} is not a state dict of tensors; download it again")
     return state
 
 
@@ -120,7 +121,7 @@ def _model(network: Network, path: Path, modified: float, device: torch.device) 
     """Trunk and heads; ``modified`` is the file's time stamp, so that a replaced file is read again."""
     trunk = {"alex": _alexnet, "vgg": _vgg16}[network]()
     prefix = "features."
-    features = {key.removeprefix(prefix): value for key, value in _state(path).items() if key.startswith(prefix)}
+    features = {key.removeprefix(prefix): value for key, value in read_weights(path).items() if key.startswith(prefix)}
     try:
         trunk.load_state_dict(features)
     except RuntimeError as error:
@@ -132,7 +133,7 @@ def _model(network: Network, path: Path, modified: float, device: torch.device) 
         raise UserError(f"LPIPS weights: {path} holds values that are not finite; download it again")
     heads_file = _heads_file(network)
     assert heads_file is not None
-    stored = _state(heads_file)
+    stored = read_weights(heads_file)
     heads = [stored[f"lin{k}.model.1.weight"].float().to(device) for k in range(len(_TRUNKS[network].taps))]
     return trunk.float().to(device).eval().requires_grad_(False), heads
 

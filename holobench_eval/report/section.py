@@ -80,13 +80,13 @@ class Section:
     """A section of the report.
 
     order: where it stands among the others; details: whether it stands in details.md and not in report.md; render: its
-    blocks, from the report and the figures of the section, each a block too; applies: whether the report has it;
-    figures: draws its figures, (file, caption) of each.
+    blocks, from the report and the figures of the section, each a block too, by default these alone; applies: whether
+    the report has it; figures: draws its figures, (file, caption) of each.
     """
 
     name: str
     order: int
-    render: Callable[[Report, Figures], Blocks]
+    render: Callable[[Report, Figures], Blocks] = lambda report, figures: figures
     applies: Callable[[Report], bool] = lambda report: True
     figures: Callable[[Report], Iterable[tuple[Path, str]]] = lambda report: ()
     details: bool = False

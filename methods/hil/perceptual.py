@@ -7,8 +7,6 @@ package, and else those of fixed filters.
 
 from __future__ import annotations
 
-import hashlib
-import pickle
 import re
 from pathlib import Path
 
@@ -17,8 +15,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...core.errors import UserError
+from ...core.hashing import file_digest
 from ...metrics.base import as_rgb, gaussian_blur
 from ...metrics.feature_distance import opponent_channels, oriented_responses
+from ...metrics.lpips import read_weights
 
 WEIGHTS = (1.5, 1.0)  # v of relu1_2 and relu2_2, Section 4.3.1
 URL = "https://download.pytorch.org/models/vgg19-dcbb9e9d.pth"
@@ -100,43 +100,24 @@ class OrientedFilters(nn.Module):
 Perceptual = VGG19 | OrientedFilters
 
 
-def perceptual_loss(location: Path | None = None) -> Perceptual:
+def perceptual_loss() -> Perceptual:
     """VGG-19 where its weights are found (see ``find_weights``), else the oriented filters; ``name`` says which."""
-    path = find_weights(location)
+    path = find_weights()
     return OrientedFilters() if path is None else VGG19(path)
 
 
-def find_weights(location: Path | None = None) -> Path | None:
-    """The file of VGG-19: ``location`` itself or the newest ``vgg19-*.pth`` in it, or in torch's hub cache, or None.
-
-    Raises UserError when ``location`` is given and there is nothing of this kind.
-    """
-    if location is not None and location.is_file():
-        return location
-    folder = Path(torch.hub.get_dir()) / "checkpoints" if location is None else location
-    newest = max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
-    if newest is None and location is not None:
-        raise UserError(f"VGG weights: no vgg19-*.pth in {location}; put {URL} there")
-    return newest
+def find_weights() -> Path | None:
+    """The newest file ``vgg19-*.pth`` in torch's hub cache, or None."""
+    folder = Path(torch.hub.get_dir()) / "checkpoints"
+    return max(folder.glob("vgg19-*.pth"), key=lambda path: path.stat().st_mtime, default=None)
 
 
 _AGAIN = "download it again"
 
 
 def _read_vgg19(path: Path) -> dict[str, Tensor]:
-    """A dictionary of tensors from a file, read without running anything in it.
-
-    A name such as torchvision's ends in the first eight digits of the file's SHA-256, which are checked.
-    """
+    """The file's tensors; the eight digits of its SHA-256 in which a name such as torchvision's ends are checked."""
     named = re.search(r"-([0-9a-f]{8})\.pth$", path.name)
-    try:
-        with path.open("rb") as file:
-            if named and not hashlib.file_digest(file, "sha256").hexdigest().startswith(named[1]):
-                raise UserError(f"VGG weights: {path} does not have the checksum in its name; {_AGAIN}")
-        state = torch.load(path, map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, OSError, ValueError) as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise UserError(f"VGG weights: {path} cannot be read as a state dict: {reason}") from error
-    if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
-        raise UserError(f"VGG weights: {path} is not a state dict of tensors; {_AGAIN}")
-    return state
+    if named and not file_digest(path).startswith(named[1]):
+        raise UserError(f"VGG weights: {path} does not have the checksum in its name; {_AGAIN}")
+    return read_weights(path, "VGG weights")

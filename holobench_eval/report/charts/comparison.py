@@ -39,13 +39,11 @@ def draw_comparison(
     targets: Sequence[tuple[str, Picture]],
     columns: Sequence[Column],
     error_scale: float,
-    truth: str = "target",
 ) -> None:
     """Draw one page.
 
     targets: (name, picture (h, w, 3) sRGB in [0, 1]) of the rows, all of one size; columns: methods, whose tiles
-    follow the order of ``targets``; error_scale: upper end of the colour bar of the error maps, sRGB value; truth: what
-    the pictures of the rows are.
+    follow the order of ``targets``; error_scale: upper end of the colour bar of the error maps, sRGB value.
     """
     tall, wide = tile_size(targets[0][1].shape)
     row_height = tall + CAPTION + zoomed(targets[0][1].shape)[0] + 2 * GAP
@@ -53,7 +51,7 @@ def draw_comparison(
     with style():
         page = Page(SIDE + (1 + len(columns)) * (wide + GAP), HEADER + len(targets) * row_height + FOOTER)
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
-        for index, heading in enumerate([truth, *(column.title for column in columns)]):
+        for index, heading in enumerate(["target", *(column.title for column in columns)]):
             words = "\n".join(textwrap.wrap(heading, int(wide / CHARACTER), max_lines=2, placeholder="..."))
             page.text(SIDE + index * (wide + GAP) + wide / 2, HEADER - 4, words, ha="center", va="bottom")
         for row, (name, target) in enumerate(targets):

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .phrases import CONSTANT, marks, tested, verdict
-from .results import Results
+from .phrases import marks, tested, verdict
+from .results import CONSTANT, Results
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
 from .tables import rounded

@@ -11,12 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from .column import DONE
-from .results import Results
+from .results import CONSTANT, Results
 from .scores import Score
 from .statistics import Estimate, PairedTest
 from .text import words
-
-CONSTANT = "floor_constant"
 
 
 def difference(score: Score, estimate: Estimate) -> str:

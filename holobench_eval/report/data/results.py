@@ -19,6 +19,7 @@ from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, family_p, mean_interval
 from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
 
+CONSTANT = "floor_constant"
 # Metrics of the main table besides the headline.
 LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd", control.NAME)
 
@@ -230,9 +231,9 @@ class Results:
             for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
-    def above_floor(self, label: str, condition: str, floor: str = "floor_constant") -> Estimate | None:
-        """Headline score minus that of a floor row of the same target; None without one, or without a target."""
-        if floor not in self.floors or not self.has_pictures(condition):
+    def above_floor(self, label: str, condition: str) -> Estimate | None:
+        """Headline score minus that of a constant image, target by target; None without one, or without a target."""
+        if CONSTANT not in self.floors or not self.has_pictures(condition):
             return None
-        found = self.estimate(self.values(label, condition) - self.values(floor, self.reference(condition)))
+        found = self.estimate(self.values(label, condition) - self.values(CONSTANT, self.reference(condition)))
         return found if found.n else None

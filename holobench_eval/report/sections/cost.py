@@ -36,11 +36,10 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 SECTIONS = (
-    Section("budget, drawn", 44, lambda _, figures: figures, applies=_is_budget, figures=_figures),
+    Section("budget, drawn", 44, applies=_is_budget, figures=_figures),
     Section(
         "cost",
         40,
-        lambda _, figures: figures,
         applies=lambda report: _spends(report.results) and not _is_budget(report) and not report.results.done.empty,
         figures=_figures,
         details=True,

@@ -27,4 +27,4 @@ def _applies(report: Report) -> bool:
     return report.layout.measure == "error_budget" and bool(report.results.conditions)
 
 
-SECTIONS = (Section("error budget", 5, lambda _, figures: figures, applies=_applies, figures=_figures),)
+SECTIONS = (Section("error budget", 5, applies=_applies, figures=_figures),)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -36,16 +36,18 @@ def _plot(report: Report) -> Iterator[tuple[Path, str]]:
         yield path, paired.caption_over_displays(report.results)
         yield from _map(report)
         return
-    for condition, stem in paired.displays(report.results)[:1]:
-        path = report.figures / f"quality-paired-{stem}.png"
-        paired.draw(report.results, condition, path)
-        yield path, paired.caption(report.results, condition)
+    yield from _paired(report, slice(1))
 
 
 def _other_plots(report: Report) -> Iterator[tuple[Path, str]]:
     """The differences on the displays after the first."""
-    many = over_displays.is_many(report.results)
-    for condition, stem in [] if many else paired.displays(report.results)[1:]:
+    if not over_displays.is_many(report.results):
+        yield from _paired(report, slice(1, None))
+
+
+def _paired(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
+    """The differences on some of the displays that have any."""
+    for condition, stem in paired.displays(report.results)[some]:
         path = report.figures / f"quality-paired-{stem}.png"
         paired.draw(report.results, condition, path)
         yield path, paired.caption(report.results, condition)
@@ -64,11 +66,6 @@ def _map(report: Report) -> Iterator[tuple[Path, str]]:
             f"Differences to {results.layout.baseline}, a mark a display, against two parts of its error, as error "
             "budgets of the displays found them. Lines: least squares, for the eye.",
         )
-
-
-def _row(report: Report) -> Iterable[tuple[Path, str]]:
-    """The row of pictures."""
-    return report.pictures(PICTURES, lambda: _pictures(report))
 
 
 def _stages(report: Report) -> Iterator[tuple[Path, str]]:
@@ -119,17 +116,15 @@ SECTIONS = (
     Section(
         "plot",
         4,
-        lambda _, figures: figures,
         applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget",
         figures=_plot,
     ),
     Section(
         "pictures",
         6,
-        lambda _, figures: figures,
         applies=_has_scores,
-        figures=_row,
+        figures=lambda report: report.pictures(PICTURES, lambda: _pictures(report)),
     ),
-    Section("other plots", 30, lambda _, figures: figures, applies=_has_scores, figures=_other_plots, details=True),
-    Section("stages", 90, lambda _, figures: figures, figures=_stages, details=True),
+    Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
+    Section("stages", 90, figures=_stages, details=True),
 )

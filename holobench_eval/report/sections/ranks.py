@@ -133,7 +133,6 @@ SECTIONS = (
     Section(
         "ranks, drawn",
         47,
-        lambda _, figures: figures,
         applies=_any,
         figures=lambda report: draw(report.ranks, report.figures),
     ),

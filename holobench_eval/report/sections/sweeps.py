@@ -11,7 +11,7 @@ from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
 from ..data.categories import OFFLINE, ONLINE
-from ..data.phrases import CONSTANT
+from ..data.results import CONSTANT
 from ..data.sweeps import Sweep
 from ..section import Report, Section
 
@@ -129,11 +129,10 @@ def _any(report: Report) -> bool:
 
 
 SECTIONS = (
-    Section("along the changes", 45, lambda _, figures: figures, applies=_any, figures=_curves),
+    Section("along the changes", 45, applies=_any, figures=_curves),
     Section(
         "pictures along the changes",
         46,
-        lambda _, figures: figures,
         applies=_any,
         figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
     ),

@@ -58,7 +58,7 @@ def expected(path: Path, image: Tensor, target: Tensor) -> float:
 @pytest.mark.parametrize("channels", [1, 3])
 def test_vgg_equals_the_formula(vgg: Path, channels: int) -> None:
     image, target = images(channels)
-    loss = perceptual_loss(vgg)
+    loss = VGG19(vgg)
     assert loss.name == "vgg19"
     assert float(loss(image, target)) == pytest.approx(expected(vgg, image, target), rel=1e-5)
     assert float(loss(image, target)) > 0.01
@@ -101,13 +101,6 @@ def test_vgg_is_used_where_its_weights_are_in_the_hub_cache(
     assert perceptual_loss().name == "vgg19"
 
 
-def test_a_folder_is_searched_and_an_empty_one_is_refused_with_the_address(vgg: Path, tmp_path: Path) -> None:
-    assert find_weights(vgg.parent) == vgg
-    for place in (tmp_path, tmp_path / "absent"):
-        with pytest.raises(UserError, match=r"no vgg19-\*.pth in .*; put https://.*vgg19-dcbb9e9d.pth there"):
-            perceptual_loss(place)
-
-
 def test_a_bad_file_is_refused_in_one_line(vgg: Path, tmp_path: Path) -> None:
     path, state = tmp_path / "vgg19-bad.pth", torch.load(vgg, weights_only=True)
     fewer = {key: value for key, value in state.items() if ".7." not in key}
@@ -117,7 +110,7 @@ def test_a_bad_file_is_refused_in_one_line(vgg: Path, tmp_path: Path) -> None:
     for content in (b"<html>404</html>", [1, 2], fewer, other, infinite, torch.nn.Linear(2, 2)):
         path.write_bytes(content) if isinstance(content, bytes) else torch.save(content, path)
         with pytest.raises(UserError) as caught:
-            perceptual_loss(path)
+            VGG19(path)
         assert "\n" not in str(caught.value)
         assert str(path) in str(caught.value)
 
@@ -128,6 +121,6 @@ def test_the_checksum_in_a_name_is_checked(vgg: Path, tmp_path: Path) -> None:
     wrong = tmp_path / "vgg19-01234567.pth"
     for path in (right, wrong):
         path.write_bytes(content)
-    assert perceptual_loss(right).name == "vgg19"
+    assert VGG19(right).name == "vgg19"
     with pytest.raises(UserError, match="checksum"):
-        perceptual_loss(wrong)
+        VGG19(wrong)
