@@ -27,13 +27,16 @@ from .networks import Network
 RATES = Rates(model=1e-2, network=3e-4)
 
 
-def residual_network(spec: DisplaySpec, network: Network, inputs: int, seed: int) -> nn.Module:
-    """A generator that adds to the prediction of a model and starts at zero; inputs: images a colour that it sees.
+def residual_network(
+    spec: DisplaySpec, network: Network, inputs: int, seed: int, draw: str = "residual network"
+) -> nn.Module:
+    """A generator that adds to the prediction of a model and starts at zero; inputs: images a colour that it sees;
+    draw: names its random numbers.
 
     The physics is learned first, and the network learns what it leaves.
     """
     channels = len(spec.wavelengths)
-    with seeded("residual network", seed):
+    with seeded(draw, seed):
         return start_at_zero(network.generator(inputs * channels, channels))
 
 

@@ -11,7 +11,6 @@ its training.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -27,8 +26,8 @@ from ..calibrated.method import SearchRetrieval, ThroughModel
 from ..calibrated.patterns import dark_samples
 from ..calibrated.terms import IdealImage, ImageTerms
 from ..hil.networks import Network
+from ..hil.plus import residual_network
 from ..learned.samples import Sample, Schedule, Steps
-from ..learned.weights import seeded, start_at_zero
 from ..wirtinger import Wirtinger
 
 
@@ -69,14 +68,8 @@ class NestedPrediction(ThroughModel):
         """Dark patterns are learned from as often as eight images each: natural ones confound haze with tone."""
         return 7 * dark_samples(bench)
 
-    @abstractmethod
-    def approximator(self, spec: DisplaySpec) -> ModelApproximator:
-        """The ideal image, before it has learned."""
-
     def _network(self, spec: DisplaySpec, inputs: int) -> nn.Module:
-        channels = len(spec.wavelengths)
-        with seeded("nested prediction", self.seed):
-            return start_at_zero(Network(name="unet").generator(inputs * channels, channels))
+        return residual_network(spec, Network(name="unet"), inputs, self.seed, "nested prediction")
 
 
 @dataclass(frozen=True)
