@@ -156,7 +156,10 @@ class Photographed:
         assert wanted is not None
         artifacts = Artifacts(self.artifacts)
         if not artifacts.has(wanted):
-            raise UserError(f"{artifacts.folder}: has no trained {self.label}; {artifacts.failure(wanted)}")
+            reason = artifacts.failure(wanted)
+            raise UserError(
+                f"{artifacts.folder}: has no trained {self.label}: {reason}; give its --artifacts or --retrain"
+            )
         return artifacts.load(wanted)
 
 
