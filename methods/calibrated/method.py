@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -13,7 +14,7 @@ from torch import Tensor
 from ...display.training import TrainingBench
 from ..learned.loop import LearnedLoop
 from ..learned.retrieval import Image, SquaredErrorRetrieval, lpips_weights, retrieve
-from ..learned.samples import Sample, Schedule, Steps
+from ..learned.samples import Sample, Schedule, Steps, together
 from ..wirtinger import Wirtinger
 from .approximator import ModelApproximator
 from .patterns import dark_samples, pattern_samples
@@ -61,8 +62,8 @@ class ThroughModel(LearnedLoop[ModelApproximator]):
         return lpips_weights(self.retrieval, self.search)
 
     def _samples(self, approximator: ModelApproximator, bench: TrainingBench) -> Sequence[Sample]:
-        dark = dark_samples(bench) if approximator.terms else []
-        return [*self._earlier(bench), *dark]
+        dark = [partial(dark_samples, bench)] if approximator.terms else []
+        return together(partial(self._earlier, bench), *dark)
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
         """Samples that every round learns from, beside its own and, of a model with terms, those of dark patterns."""

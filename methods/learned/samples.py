@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Protocol
@@ -11,6 +11,7 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...core.errors import Pending
 from ...display.training import TrainingBench, TrainingImage
 from .retrieval import Image
 
@@ -124,6 +125,20 @@ def captured(
     for key, phase, image in zip(keys, phases, images, strict=True):
         kept = bench.kept(key, partial(_photograph, bench, phase, image, *names))
         yield Sample(phase, kept["capture"], image.target, bench.light(image))
+
+
+def together(*kinds: Callable[[], Sequence[Sample]]) -> list[Sample]:
+    """Samples of several kinds. Those of all kinds are announced before one that waits for a photograph says so, so
+    that people who exchange files with a bench take them in one round."""
+    found, waits = list[Sample](), list[Pending]()
+    for kind in kinds:
+        try:
+            found += kind()
+        except Pending as pending:
+            waits.append(pending)
+    if waits:
+        raise waits[0]
+    return found
 
 
 def _photograph(bench: TrainingBench, phase: Tensor, image: TrainingImage, *names: object) -> dict[str, Tensor]:

@@ -19,7 +19,7 @@ from ..calibrated.method import ShortSchedule, ThroughModel
 from ..calibrated.patterns import dark_samples, pattern_samples
 from ..double_phase import DoublePhase
 from ..gerchberg_saxton import GerchbergSaxton
-from ..learned.samples import Sample, Steps, captured
+from ..learned.samples import Sample, Steps, captured, together
 from ..learned.weights import refuse_other_weights
 from ..sgd import AmplitudeSGD
 from ..wirtinger import Wirtinger
@@ -109,9 +109,11 @@ class Twin(ThroughModel):
         return estimates(learned, spec)
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
+        return together(partial(pattern_samples, bench, self.patterns), partial(self._holograms, bench))
+
+    def _holograms(self, bench: TrainingBench) -> Sequence[Sample]:
         numbers = range(self.holograms)
         images = [bench.images[number % len(bench.images)] for number in numbers]
         methods = [OPEN_LOOP[number % len(OPEN_LOOP)] for number in numbers]
         phases = [bench.solved(method, image) for method, image in zip(methods, images, strict=True)]
-        shown = captured(bench, [f"hologram {number}" for number in numbers], phases, images, "hologram")
-        return [*pattern_samples(bench, self.patterns), *shown]
+        return list(captured(bench, [f"hologram {number}" for number in numbers], phases, images, "hologram"))
