@@ -45,7 +45,7 @@ def twin(
     if file_name(name) != name:
         raise UserError(f"{output}: the folder names the display; expected {NAME}")
     source = _photographs(display, output, panel, pictures, artifacts, retrain)
-    print(f"{output}: the twin is written and tried")
+    print(f"{output}: photographs are there; the twin is tried on the same holograms")
     profile = twins.write_trial(source, name, output)
     _run(output, TRIAL, artifacts, retrain=False)
     trial = twins.in_folder(output, artifacts, TRIAL)
@@ -64,25 +64,38 @@ def _photographs(
     from ..core.io import write_atomically
     from ..lab.session.manifest import FILE as MANIFEST
     from ..study.calibration import twin as twins
-    from ..study.calibration.twin import PHOTOGRAPHS
+    from ..study.calibration.twin import PHOTOGRAPHS, WORK
 
+    name = output.resolve().name
     if Path(display).is_dir():
         if not (Path(display) / MANIFEST).is_file():
             raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display")
         if (panel, pictures, retrain) != (None, None, False):
             raise UserError(f"{display}: --panel, --pictures and --retrain are not for a session, which has its study")
-        return twins.of_session(Path(display))
+        source = twins.of_session(Path(display))
+        twins.refuse(name, source, output)
+        return source
     if panel and twins.is_bench(Path(display)):
         raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
-    text, config = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES), output / f"{PHOTOGRAPHS}.yaml"
-    if config.is_file() and config.read_text(encoding="utf-8") != text:
+    text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES)
+    config = output / WORK / f"{PHOTOGRAPHS}.yaml"
+    is_new = not config.exists()
+    if not is_new and config.read_text(encoding="utf-8") != text:
         raise UserError(f"{output}: holds the twin of another display or of other settings; choose another --output")
     write_atomically(config, text.encode())
+    try:
+        twins.refuse(name, twins.in_folder(output, artifacts), output)
+    except UserError:
+        if is_new:
+            config.unlink()
+        raise
     _run(output, PHOTOGRAPHS, artifacts, retrain)
     return twins.in_folder(output, artifacts)
 
 
 def _run(folder: Path, study: str, artifacts: Path, retrain: bool) -> None:
+    from ..study.calibration.twin import WORK
     from .run import run
 
-    run(folder / f"{study}.yaml", output=folder / study, artifacts=artifacts, retrain=retrain)
+    work = folder / WORK
+    run(work / f"{study}.yaml", output=work / study, artifacts=artifacts, retrain=retrain)

@@ -45,13 +45,14 @@ class Description:
     """What the report says of a study besides its numbers; every field may be empty.
 
     config_file: the config as the user named it; config_text: what is in it; command: what writes the report again
-    (empty: a run of the config).
+    (empty: a run of the config); models: what is known of the twins that methods descend through, by label.
     """
 
     displays: tuple[Display, ...] = ()
     config_file: str = ""
     config_text: str = ""
     command: str = ""
+    models: Mapping[str, str] = field(default_factory=dict)
 
 
 def describe(study: Study) -> Description:
@@ -70,7 +71,14 @@ def describe(study: Study) -> Description:
     file = typed.name if typed.is_absolute() else typed.as_posix()
     command = "holoeval session import with the session's folder" if study.display.session else ""
     command = f"holoeval run {shlex.quote(file)} {study.changes}" if study.changes else command
-    return Description(displays, file, study.text, command)
+    return Description(displays, file, study.text, command, _models(study))
+
+
+def _models(study: Study) -> dict[str, str]:
+    """What is known of the twins that methods descend through."""
+    through = {entry.label: entry.params["profile"] for entry in study.methods if entry.name == "through"}
+    known = {label: load_profile(str(profile), study.folder).twin.words for label, profile in through.items()}
+    return {label: words for label, words in known.items() if words}
 
 
 def _learned(condition: Condition, profile: str) -> Display:

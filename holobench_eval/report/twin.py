@@ -104,14 +104,13 @@ def _methods(found: Trial) -> Markdown:
 
 
 def _others(found: Trial) -> Markdown:
-    head = ["display", "further, mean [dB]", "Kendall's tau", "two without a camera, off by [dB]", "flattery [dB]"]
+    head = ["display", "further, mean [dB]", "Kendall's tau", "two without a camera, off by [dB]"]
     lines = [
         [
             name,
             f"{np.mean([each.gaps[:, 0].mean() for each in shown.values()]):.1f}",
             f"{found.tau(name):.2f}",
             f"{found.worst(name).apart:.1f}",
-            _signed(found.difference(found.label, name)),
         ]
         for name, shown in found.twins.items()
     ]
@@ -123,8 +122,8 @@ def _parameters(photographed: Photographed) -> Iterable[Markdown | str]:
     yield quantities(rows)
     hidden = [QUANTITIES[row["name"]].words for row in rows if row.get("seen") is False]
     yield (
-        "Stated errors hold with 90 %, from fits to halves of the photographs that show different holograms; in "
-        "brackets the truth, where the display is simulated."
+        "Stated errors are meant to hold with 90 %: how far fits to halves of the photographs, of different holograms, "
+        "move apart. In brackets the truth, where the display is simulated."
     )
     if hidden:
         yield f"No photograph shows: {', '.join(dict.fromkeys(hidden))}."

@@ -92,6 +92,7 @@ def write_profile(held: Mapping[str, Tensor], base: Profile, folder: Path) -> Pa
         "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **sensor},
         "residual_bound": base.residual_bound,
         "maps": {"file": f"{stem}.npz", "size": len(packed), "sha256": hashlib.sha256(packed).hexdigest()},
+        **({"lut": {"table": base.panel.levels}} if base.panel.levels and "lut.table" not in held else {}),
         **({"twin": asdict(base.twin)} if base.twin.of else {}),
     }
     lines = "".join(f"{key}: {json.dumps(value)}\n" for key, value in document.items())

@@ -57,10 +57,13 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert "Flattery: holograms made through the twin" in printed
     assert "| lab-turned |" in report
     assert "| twin (flattery) |" in report
-    assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "trial/report.md"))
+    assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "work/trial/report.md"))
     assert basis(profile).startswith(
-        f"simulated, a twin of leto-aged, learned from {photographs} photographs: its captur"
+        f"simulated, a twin of leto-aged, trained with {photographs} photographs: its captur"
     )
+    Path("lab/lab.npz").unlink()
+    source = twins.in_folder(Path("lab"), Path("artifacts"))
+    assert load_profile(str(twins.publish(twins.write_trial(source, "lab", Path("lab")), Path("lab")))).version == 2
     with pytest.raises(UserError, match=r"^lab: holds the twin of another display or of other settings"):
         twin("ideal", Path("lab"), panel=PANEL, pictures=3)
 
@@ -72,6 +75,8 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["leto-aged", "-o", "my lab"], "my lab: the folder names the display; expected a-z"),
         (["empty", "-o", "lab"], "empty: a folder without manifest.json"),
         (["pluto-fourier", "-o", "lab"], "Fresnel plane"),
+        (["mine.yaml", "-o", "."], "mine.yaml: is no twin of 'mine'; choose another --output"),
+        (["eye.yaml", "-o", "lab"], "'eye': a display that is seen through a known lens has no twin"),
         (["bench.yaml", "-o", "lab", "--panel", "128", "128"], "bench.yaml: a bench has the panel that its file says"),
     ],
 )
@@ -82,8 +87,12 @@ def test_what_cannot_be_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
     Path("empty").mkdir()
+    Path("mine.yaml").write_text("like: leto-aged\nname: mine\n")
+    Path("eye.yaml").write_text("like: leto-2020\nname: eye\neye: {focus: [0.2, 0, 0], known: true}\n")
     Path("bench.yaml").write_text("name: mine\nslm: {}\n")
     monkeypatch.setattr("sys.argv", ["holoeval", "twin", *arguments])
     with pytest.raises(SystemExit) as ended:
@@ -92,11 +101,21 @@ def test_what_cannot_be_is_one_line(
     assert ended.value.code == 2
     assert printed.count("\n") == 1
     assert fault in printed
+    assert not list(folder.rglob("photographs.yaml"))  # so that the next call is not refused
+    assert Path("mine.yaml").read_text() == "like: leto-aged\nname: mine\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "is_bench"), [("name: a\nseed: 3\n", False), ("like: ideal\n", False), ("slm: {}\n", True), ("- 1", False)]
-)
+KINDS = {
+    "name: a\nseed: 3\n": False,
+    "like: ideal\n": False,
+    "name: a\nrelay: {}\n": False,
+    "- 1": False,
+    "name: a\nslm: {}\n": True,
+    "name: a\nversion: 1\npanel: {}\n": True,
+}
+
+
+@pytest.mark.parametrize(("text", "is_bench"), KINDS.items())
 def test_the_file_of_a_bench_is_told_from_a_profile(text: str, is_bench: bool, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)

@@ -31,6 +31,8 @@ def page() -> str:
 def _note(key: str) -> str:
     if key in STAGES:
         return f"{STAGES[key].title[0].upper()}{STAGES[key].title[1:]}: {STAGES[key].model}."
+    if key != "maps":
+        return ""
     rows = (
         f"| `{name}` | {', '.join(each.axes)} | {each.unit} | {each.low:g} to {each.high:g} | {each.meaning} | "
         f"{', '.join(f'`{other}`' for other in each.instead)} |"

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import torch
 
 from ...optics.angular_spectrum import angular_spectrum_phase
 from ...optics.convolution import iris
+from ...optics.phase import TAU
 from ..estimates import MODES, Estimate, disc, estimate, focusing, reach, stray, stroke, undiffracted, zernike_waves
+from .maps import enlarged
 from .pipeline import SimulatedBench
 
 LEVELS = 17  # gray levels at which the stroke is read, the two at the wrap left out
@@ -41,10 +44,16 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),
         estimate("crosstalk", colour, math.sqrt(math.prod(profile.crosstalk.widths(colour)))),
-        *undiffracted(unmodulated / modulated * _passed(bench), colour),
-        estimate("light", colour, light * float(bench.response.mean())),
+        *undiffracted(unmodulated / modulated * _passed(bench) * cmath.exp(-1j * TAU * law.offset), colour),
+        estimate("light", colour, light * float(bench.response.mean()) * _shaded(bench, colour)),
         *stray(*profile.stray_light.veil(colour), colour),
     ]
+
+
+def _shaded(bench: SimulatedBench, colour: int) -> float:
+    """Mean over the region of a shading that was measured."""
+    own = bench.profile.sensor.map_of("shading", colour)
+    return 1.0 if own is None else float(bench.spec.region.crop(enlarged(own, bench.spec.shape)).mean())
 
 
 def _passed(bench: SimulatedBench) -> float:

@@ -237,7 +237,8 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
     if profile.maps.file is not None:
         profile = _with_maps(profile, documents)
-    return replace(profile, digest=hashlib.sha256(text.encode()).hexdigest())
+    trust = profile.twin if "twin" in documents[-1].data else Trust()  # of this file, and of none that is like it
+    return replace(profile, twin=trust, digest=hashlib.sha256(text.encode()).hexdigest())
 
 
 def profile_files(name: str, folder: Path | None = None) -> list[Path]:

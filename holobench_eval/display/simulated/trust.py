@@ -17,10 +17,10 @@ Decibels = Annotated[float, Interval(ge=-100, le=100)]
 class Trust:
     """What a twin was tried on: holograms and pictures that it did not learn from. No number changes the display.
 
-    of: the display that it was learned from, empty for a profile that is no twin; photographs: that it was learned
-    from [count]; pictures: that it was tried on [count]; gap: how much further its captures are from a photograph than
-    a second photograph is, by method [dB]; flattery: score on the twin less score on the display, of holograms that
-    were made through the twin, mean over pictures [dB]; flattery_error: half of its 95 % interval [dB].
+    of: the display that it was learned from, empty for a profile that is no twin; photographs: that its
+    training took [count]; pictures: that it was tried on [count]; gap: how much further its captures are from a
+    photograph than a second photograph is, by method [dB]; flattery: score on the twin less score on the display, of
+    holograms that were made through the twin, mean over pictures [dB]; flattery_error: half of its 95 % interval [dB].
     """
 
     of: str = ""
@@ -28,7 +28,7 @@ class Trust:
     pictures: Annotated[int, Interval(ge=0)] = 0
     gap: Mapping[str, Decibels] = field(default_factory=dict)
     flattery: Decibels = 0.0
-    flattery_error: Decibels = 0.0
+    flattery_error: Annotated[float, Interval(ge=0, le=100)] = 0.0
 
     @property
     def words(self) -> str:
@@ -40,7 +40,7 @@ class Trust:
             self.flattery > MOST
         )
         return (
-            f"a twin of {self.of}, learned from {self.photographs} photographs: its captures are further from a "
+            f"a twin of {self.of}, trained with {self.photographs} photographs: its captures are further from a "
             f"photograph than a second photograph is by {', '.join(gaps)} dB, and holograms made through it score "
             f"{self.flattery:.1f} ± {self.flattery_error:.1f} dB too high on it{warning}"
         )

@@ -65,6 +65,8 @@ def _displays(report: Report) -> Iterator[str]:
         same.setdefault(display.basis or display.heading, []).append(display.name)
     for basis, names in same.items():
         yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
+    for label, model in report.description.models.items():
+        yield f"{label}: descends through {model}."
     if report.layout.measure == FILES:
         yield "Display: real, and known from its photographs alone."
 

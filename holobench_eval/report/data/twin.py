@@ -15,6 +15,7 @@ from torch import Tensor
 from ...display.simulated.trust import Trust
 from ...metrics import match
 from ...study.calibration.twin import Photographed, trial_names
+from ...study.plan import Cell
 from .statistics import Estimate, mean_interval
 
 DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
@@ -120,7 +121,7 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
         item: Noise.of([photographed.pair(*key) for key in photographed.twice if key[1] == item]) for item in pictures
     }
     for label in labels:
-        own = {item: [photographed.captures(cell) for cell in cells[label, item]] for item in pictures}
+        own = {item: [photographed.captures(cell) for cell in same(photographed, label, item)] for item in pictures}
         display[label] = np.array([np.mean([score for _, score in shots]) for shots in own.values()])
         for each, shown in twins.items():
             others = {item: trial.captures(on_twins[each][label, item][0]) for item in pictures}
@@ -132,6 +133,13 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
             shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
     learned = photographed.learned.provenance["captures"]
     return Trial(name, photographed.display.name, photographed.label, learned, pictures, display, twins)
+
+
+def same(photographed: Photographed, label: str, item: str) -> list[Cell]:
+    """The photographs of the hologram that is shown on the twin: all repeats, or the first of a method whose repeats
+    have random starts."""
+    (cells,) = photographed.cells().values()
+    return cells[label, item][: None if (label, item) in photographed.twice else 1]
 
 
 @dataclass(frozen=True)

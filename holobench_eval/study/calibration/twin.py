@@ -13,11 +13,13 @@ import torch
 import yaml
 from torch import Tensor
 
-from ...core.errors import UserError
+from ...core.errors import CellError, UserError
 from ...core.installed import shipped_configs
 from ...core.io import file_name, write_atomically
+from ...core.yaml_source import load
 from ...display import Profile, load_profile
 from ...display.simulated.maps import load_maps
+from ...display.simulated.profile import STAGES
 from ...display.simulated.stages import Sensor
 from ...lab.bench_file import load_bench_file
 from ...lab.session import read_manifest
@@ -35,11 +37,13 @@ from ..plan import Cell, Plan, plan
 from ..scoring.scores import kept_capture
 from ..store import Store
 
-PHOTOGRAPHS, TRIAL = "photographs", "trial"  # in the folder of a twin: two studies, a config and a report each
+WORK = "work"  # in the folder of a twin: two studies, a config and a report each, and the displays of the trial
+PHOTOGRAPHS, TRIAL = "photographs", "trial"
 TURNED, BLANK = "turned", "blank"  # displays that a twin has to be better than
 OVER_PANEL = ("lut.gain", "illumination.amplitude", "illumination.phase")
-NOISY = 4  # pictures that tell the noise of a camera
+NOISY = 2  # pictures of each method, which tell the noise of a camera
 SCORE = "psnr_linear"
+OF_PROFILES = {"seed", "like", "sampling", "maps"}
 FEWEST = 3  # pictures, and methods: two without a camera, whose difference is compared, and the twin
 
 
@@ -55,14 +59,14 @@ def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
 
 
 def is_bench(path: Path) -> bool:
-    """Whether a file describes a bench with devices: it has no seed, as every profile has that is like no other."""
+    """Whether a file describes a bench with devices: it has nothing that a profile alone has."""
     if not path.is_file():
         return False
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError):
         return False  # which load_profile says with its place
-    return isinstance(data, dict) and not data.keys() & {"seed", "like"}
+    return isinstance(data, dict) and not data.keys() & (OF_PROFILES | STAGES.keys() - {"panel"})
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,11 @@ class Photographed:
     def plan(self) -> Plan:
         """Its plan."""
         return plan(self.study)
+
+    @property
+    def store(self) -> Store:
+        """Its records."""
+        return Store(self.output)
 
     @cached_property
     def display(self) -> Condition:
@@ -104,8 +113,7 @@ class Photographed:
 
     def captures(self, cell: Cell) -> tuple[Tensor, float]:
         """The kept capture ``(C, h, w)`` of a cell, and its PSNR [dB]. UserError: it was not taken, or is damaged."""
-        store = Store(self.output)
-        record, kept = store.read(cell.id), kept_capture(store.capture(cell.id))
+        record, kept = self.store.read(cell.id), kept_capture(self.store.capture(cell.id))
         if record is None or record.state != "done" or not kept:
             state = "waits for its photograph" if record is None else record.reason or "has lost its capture"
             raise UserError(f"{self.output}: {cell.method} on {cell.target} {state}; a twin needs every cell")
@@ -164,13 +172,27 @@ class Photographed:
 
 
 def of_session(folder: Path) -> Photographed:
-    """The study of a session's folder. UserError as ``study_of``."""
-    return Photographed(study_of(folder, read_manifest(folder), None), folder / REPORT, folder / ARTIFACTS)
+    """The study of a session's folder. UserError as ``study_of``, and for photographs that are not taken yet."""
+    found = Photographed(study_of(folder, read_manifest(folder), None), folder / REPORT, folder / ARTIFACTS)
+    if any(found.store.read(cell.id) is None for cell in found.plan.cells):
+        raise UserError(f"{folder}: photographs are missing; holoeval session import {folder} says which")
+    return found
 
 
 def in_folder(folder: Path, artifacts: Path, name: str = PHOTOGRAPHS) -> Photographed:
     """The study of that name in the folder of a twin."""
-    return Photographed(load_study(folder / f"{name}.yaml"), folder / name, artifacts)
+    return Photographed(load_study(folder / WORK / f"{name}.yaml"), folder / WORK / name, artifacts)
+
+
+def refuse(name: str, photographed: Photographed, folder: Path) -> None:
+    """UserError, before any photograph, for a display that can have no twin, and where another file has its name."""
+    display = photographed.display
+    if replace(nominal(name, photographed).spec(), name=display.spec.name) != display.spec:
+        raise UserError(f"'{display.name}': a display that is seen through a known lens has no twin")
+    _ = photographed.label
+    own = folder / f"{file_name(name)}.yaml"
+    if own.is_file() and (load(own).data.get("twin") or {}).get("of") != display.name:
+        raise UserError(f"{own}: is no twin of '{display.name}'; choose another --output")
 
 
 def nominal(name: str, photographed: Photographed) -> Profile:
@@ -190,13 +212,13 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     """Write the twin as a profile, two that it has to be better than, and the study of all three.
 
     Of ``turned`` the maps over the panel are turned by half a turn, ``blank`` has no maps. The camera's noise is that
-    of two photographs. Returns the profile of the twin, whose maps are in ``folder / TRIAL``.
+    of two photographs. Returns the profile of the twin, whose maps are beside it. UserError: it cannot be registered.
     """
     (cells,) = photographed.cells().values()
     for kind, found in zip(("methods", "pictures"), map(set, zip(*cells, strict=True)), strict=True):
         if len(found) < FEWEST:
             raise UserError(f"{photographed.study.file}: {len(found)} {kind}; a twin is tried on {FEWEST} or more")
-    trial = folder / TRIAL
+    trial = folder / WORK / TRIAL
     base = nominal(name, photographed)
     model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
     untried = load_profile(str(to_profile(model, camera, base, trial)))
@@ -206,7 +228,7 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     turned = {key: values.flip(-2, -1) if key in OVER_PANEL else values for key, values in held.items()}
     for other, maps in ((TURNED, turned), (BLANK, {})):
         write_profile(maps, replace(base, name=f"{name}-{other}"), trial)
-    write_atomically(folder / f"{TRIAL}.yaml", _trial_text(photographed, name).encode())
+    write_atomically(folder / WORK / f"{TRIAL}.yaml", _trial_text(photographed, name).encode())
     return profile
 
 
@@ -220,7 +242,12 @@ def _camera(photographed: Photographed, profile: Profile) -> Sensor:
     """The camera of a profile, whose well and read noise are such that two captures differ as two photographs do."""
     seen = simulated = 0.0
     bench = open_bench(profile, seed=photographed.study.seed)
-    for label, item in photographed.twice[:NOISY]:
+    try:
+        _ = bench.registration
+    except CellError as error:
+        raise UserError(f"'{profile.name}': the twin is too far from its display to be photographed: {error}") from None
+    pictures = list(dict.fromkeys(item for _, item in photographed.twice))[:NOISY]
+    for label, item in (pair for pair in photographed.twice if pair[1] in pictures):
         target, phase = photographed.target(item), photographed.phase(label, item)
         simulated += _difference([bench.photograph(phase, target, item, again).image for again in (0, 1)], target)
         seen += _difference(photographed.pair(label, item), target)
@@ -265,10 +292,11 @@ def publish(profile: Profile, folder: Path) -> Path:
 
     profile: of the trial, whose maps it has.
     """
-    held = load_maps(profile.maps, folder / TRIAL, _sizes(profile))
+    held = load_maps(profile.maps, folder / WORK / TRIAL, _sizes(profile))
     path = folder / f"{file_name(profile.name)}.yaml"
-    if path.is_file():
-        before = load_profile(str(path))
-        same = (before.maps, before.twin, before.sensor) == (profile.maps, profile.twin, profile.sensor)
-        profile = replace(profile, version=before.version + (not same))
-    return write_profile(held, profile, folder)
+    before = load(path).data if path.is_file() else {}
+    version = int(before.get("version", 0))
+    write_profile(held, replace(profile, version=max(1, version)), folder)
+    if before and load(path).data != before:
+        write_profile(held, replace(profile, version=version + 1), folder)
+    return path

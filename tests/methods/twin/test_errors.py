@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 
-from holobench_eval.display import load_profile
+from holobench_eval.display import Profile, load_profile
 from holobench_eval.display.api import DisplaySpec
 from holobench_eval.display.estimates import QUANTITIES, joined
+from holobench_eval.display.simulated.ground_truth import truth
+from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.methods.calibrated.approximator import PredictedCapture
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.twin.errors import MISFIT, NUDGES, QUANTILE, estimates, unseen
 from holobench_eval.methods.twin.model import TwinCamera, TwinModel
+from holobench_eval.methods.twin.to_profile import to_profile
 
 LIGHT = torch.tensor([0.5, 0.7, 0.9])
 
@@ -59,6 +63,22 @@ def test_light_is_what_the_camera_counts() -> None:
         each["terms"]["gain"] = torch.full((3,), math.log(0.9))
     after = {item.colour: item.value for item in estimates(state, spec()) if item.name == "light"}
     assert after == pytest.approx({colour: 0.9 * value for colour, value in before.items()})
+
+
+def test_what_a_twin_says_is_the_truth_of_its_profile(tmp_path: Path) -> None:
+    base = Profile("lab", 1, 0, "", panel=load_profile("leto-aged").scaled((80, 96)).panel)
+    model, camera, draw = TwinModel(base.spec()), TwinCamera(base.spec()), torch.Generator().manual_seed(4)
+    with torch.no_grad():
+        camera.share.fill_(-2.0)
+        for parameter, size in ((model.table, 0.1), (model.undiffracted, 0.3), (camera.shading, 0.1)):
+            parameter += size * torch.randn(parameter.shape, generator=draw)
+        camera.gain.fill_(-0.1)
+    state = {"model": model.state_dict(), "terms": camera.state_dict()}
+    told = estimates({**state, "halves": [state] * 2, "unseen": []}, base.spec())
+    known = truth(SimulatedBench(load_profile(str(to_profile(model, camera, base, tmp_path)))))
+    for row in joined(told, known):
+        if row["truth"] is not None:
+            assert row["value"] == pytest.approx(row["truth"], abs=0.01), row["name"]
 
 
 @torch.no_grad()

@@ -73,7 +73,7 @@ def test_differences_of_methods_are_compared_in_pairs_and_orders() -> None:
 def test_a_profile_says_what_its_twin_was_tried_on() -> None:
     trust = trial().trust()
     assert trust == Trust("bench", 59, 3, {"good": 1.0, "bad": 1.0, "own": 2.0}, 2.0, 2.48)
-    assert "learned from 59 photographs" in trust.words
+    assert "trained with 59 photographs" in trust.words
     assert "score 2.0 ± 2.5 dB too high" in trust.words
     assert "more than 3 dB" not in trust.words
     assert "more than 3 dB: it does not tell" in replace(trust, flattery=3.1).words
