@@ -25,18 +25,21 @@ from ..calibrated.terms import ImageTerms, spread
 
 FINER = 2  # samples of the image, a pixel and axis, at which its intensity is not undersampled
 WINDOW = 5.0  # px, standard deviation of the window of the interpolation
+FINE = 0.1  # of a step of the smooth maps, that of a pixel
 POSE_GRID = 4  # points along an axis of the camera's displacement
 
 
 class TwinModel(DisplayModel):
     """Phase ``(C, H, W)`` [rad] to the intensity ``(C, 2 H, 2 W)`` in the image plane, two samples a pixel and axis.
 
-    The parameters are those of ``DisplayModel``, on finer grids. A phase is rounded to the levels of the panel, and its
-    gradient passes. Each sub-sample sends its light from its own place and is a small square.
+    The parameters are those of ``DisplayModel``, on finer grids, and ``specks``, the dirt of single pixels. A phase is
+    rounded to the levels of the panel, and its gradient passes. Each sub-sample sends its light from its own place and
+    is a small square.
     """
 
     GAIN_GRID: ClassVar[int] = 12
     SOURCE_GRID: ClassVar[int] = 64
+    SPECK_GRID: ClassVar[int] = 640  # at most, along an axis: a profile has at most 20 MB of maps
 
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__(spec)
@@ -44,6 +47,8 @@ class TwinModel(DisplayModel):
         self.gain = nn.Parameter(torch.zeros(channels, self.GAIN_GRID, self.GAIN_GRID))
         self.amplitude = nn.Parameter(torch.zeros(channels, self.SOURCE_GRID, self.SOURCE_GRID))
         self.angle = nn.Parameter(torch.zeros(channels, self.SOURCE_GRID, self.SOURCE_GRID))
+        finest = (min(side, self.SPECK_GRID) for side in spec.shape)
+        self.specks = nn.Parameter(torch.zeros(2, channels, *finest))
         rows, columns = sample_weights(spec.shape, SAMPLES, spec.blaze, hold=True)
         self.register_buffer("rows", rows, persistent=False)
         self.register_buffer("columns", columns, persistent=False)
@@ -55,21 +60,29 @@ class TwinModel(DisplayModel):
 
     forward = over_panel
 
+    def dirt(self, shape: tuple[int, int]) -> Tensor:
+        """Logarithm of the amplitude, and phase [rad], ``(2, C, *shape)``, of the light besides its smooth maps."""
+        return FINE * torch.stack([each if each.shape[1:] == shape else enlarged(each, shape) for each in self.specks])
+
+    def _illumination(self) -> Tensor:
+        amplitude, angle = self.dirt(self.spec.shape)
+        return super()._illumination() * torch.exp(amplitude) * phasor(angle.new_ones(()), angle)
+
     def _driven(self, phase: Tensor) -> Tensor:
         bits = self.spec.bits
         return super()._driven(straight_through_level(phase, bits) * (TAU / 2**bits))
 
     def _image(self, shown: Tensor, maps: Maps, offsets: Sequence[float]) -> Tensor:
-        panel = self._panel(shown, maps.taps) * maps.light
+        panel = self._panel(shown, maps)
         models = (self._propagator(colour, offset) for colour, offset in enumerate(offsets))
         plane = torch.stack([model.forward(field) for model, field in zip(models, panel, strict=True)])
         return torch.fft.ifft2(torch.fft.fft2(plane) * maps.pupil) * maps.amplitude
 
-    def _panel(self, shown: Tensor, taps: Tensor) -> Tensor:
+    def _panel(self, shown: Tensor, maps: Maps) -> Tensor:
         """Field ``(C, H, W)`` of pixels that have the spectrum of all sub-samples of the phase that they show."""
-        phases = sub_samples(shown, taps)
+        phases = sub_samples(shown, maps.taps)
         field = phasor(phases.new_ones(()), phases)
-        field = field + torch.view_as_complex(self.undiffracted)[:, None, None, None]
+        field = (field + torch.view_as_complex(self.undiffracted)[:, None, None, None]) * maps.light[:, None]
         if self.ramp is not None:  # the optical axis follows the blaze
             field = field * phasor(self.ramp.new_ones(()), -self.ramp)
         spectra = torch.fft.fft2(field)

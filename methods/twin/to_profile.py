@@ -105,6 +105,8 @@ def panel_maps(model: TwinModel) -> dict[str, Tensor]:
     """What a twin has of the panel and its light, by ``maps.KEYS``."""
     spec, channels = model.spec, len(model.table)
     size = (min(DENSE, spec.shape[0]), min(DENSE, spec.shape[1]))
+    rows, columns = model.specks.shape[2:]
+    finest, specks = (rows, columns), model.dirt((rows, columns))
     levels = torch.arange(2**spec.bits, device=model.table.device) * (TAU / 2**spec.bits)
     aberration = model.aberration.new_zeros(channels, len(NAMES))
     aberration[:, [NAMES[mode] - 1 for mode in MODES]] = model.aberration
@@ -112,8 +114,8 @@ def panel_maps(model: TwinModel) -> dict[str, Tensor]:
         "lut.table": model._driven(levels.expand(channels, 1, -1))[:, 0],
         "lut.gain": enlarged(model.gain, size).exp(),
         "crosstalk.width": model.crosstalk.exp()[:, None].expand(-1, 2),
-        "illumination.amplitude": enlarged(model.amplitude, size).exp(),
-        "illumination.phase": enlarged(model.angle, size),
+        "illumination.amplitude": (enlarged(model.amplitude, finest) + specks[0]).exp(),
+        "illumination.phase": enlarged(model.angle, finest) + specks[1],
         "propagation.aberration": aberration,
         "zero_order.field": model.undiffracted,
     }

@@ -24,7 +24,7 @@ PANEL = (96, 112)
 LIGHT = torch.tensor([0.5, 0.7, 0.9])
 AWAY = {
     **{"table": 0.15, "gain": 0.03, "crosstalk": 0.2, "amplitude": 0.1, "angle": 0.15, "undiffracted": 0.15},
-    **{"aberration": 0.1, "brightness": 0.2, "fine": 0.05, "share": 0.5, "reach": 0.3, "offset": 0.01},
+    **{"aberration": 0.1, "brightness": 0.2, "specks": 0.5, "share": 0.5, "reach": 0.3, "offset": 0.01},
     **{"shading": 0.05, "blur": 0.2, "gamma": 0.1, "moved": 0.3},
 }
 M = TypeVar("M", bound=nn.Module)
