@@ -32,13 +32,14 @@ protocol: {{metrics: [psnr]}}
 # one laser and three, eight bits and one; three lasers with eight bits are those of other tests
 DISPLAYS = [([5.32e-7], 8, [119, 131]), ([6.38e-7, 5.2e-7, 4.5e-7], 1, [119, 131])]
 TAKEN = {"profile", "display", "config"}  # parameters by which a command is told a display
+APART = {"twin"}  # it learns for minutes: its models are tried on such displays in tests/methods/twin
 
 
 def commands(group: typer.Typer = app, *words: str) -> Any:
     """The words and the function of every command that takes a display, in the order of work."""
     for info in group.registered_commands:
         name = info.name or info.callback.__name__.rstrip("_")
-        if TAKEN & set(inspect.signature(info.callback).parameters) or name == "list":
+        if name not in APART and (TAKEN & set(inspect.signature(info.callback).parameters) or name == "list"):
             yield (*words, name), info.callback
     for info in group.registered_groups:
         yield from commands(info.typer_instance, *words, info.name)

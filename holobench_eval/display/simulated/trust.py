@@ -17,13 +17,13 @@ Decibels = Annotated[float, Interval(ge=-100, le=100)]
 class Trust:
     """What a twin was tried on: holograms and pictures that it did not learn from. No number changes the display.
 
-    of: the display that it was learned from, empty for a profile that is no twin; photographs: that its
+    of: the display that it was learned from, null for a profile that is no twin; photographs: that its
     training took [count]; pictures: that it was tried on [count]; gap: how much further its captures are from a
     photograph than a second photograph is, by method [dB]; flattery: score on the twin less score on the display, of
     holograms that were made through the twin, mean over pictures [dB]; flattery_error: half of its 95 % interval [dB].
     """
 
-    of: str = ""
+    of: str | None = None
     photographs: Annotated[int, Interval(ge=0)] = 0
     pictures: Annotated[int, Interval(ge=0)] = 0
     gap: Mapping[str, Decibels] = field(default_factory=dict)
