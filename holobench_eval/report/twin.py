@@ -41,6 +41,8 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             "photograph is, which differs by noise alone; of all colours, and of each.",
             Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
             "Pale: the twin with its maps turned by half a turn (x), and without maps (+).",
+            heading("Differences of two methods"),
+            _pairs(found),
             heading("Beside twins that know less"),
             _others(found),
             f"Only what the first row has and the others lack is knowledge of {found.of}.",
@@ -101,6 +103,14 @@ def _methods(found: Trial) -> Markdown:
         likeness = f"{shown.likeness[:, 0].mean():.1f}"
         lines.append([named, *means, _signed(found.difference(label)), likeness, *(f"{gap:.2f}" for gap in gaps)])
     return table(head, lines)
+
+
+def _pairs(found: Trial) -> Markdown:
+    lines = [
+        [f"{pair.first} less {pair.second}", _signed(pair.display), _signed(pair.twin), f"{pair.apart:.2f}"]
+        for pair in sorted(found.pairs(), key=lambda pair: -pair.apart)
+    ]
+    return table(["methods", "display [dB]", "twin [dB]", "apart [dB]"], lines)
 
 
 def _others(found: Trial) -> Markdown:
