@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -69,12 +71,16 @@ def _photographs(
     name = output.resolve().name
     if Path(display).is_dir():
         if not (Path(display) / MANIFEST).is_file():
-            raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display")
+            own = Path(display, f"{Path(display).resolve().name}.yaml")
+            hint = f"; the twin there is {own}" * own.is_file()
+            raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display{hint}")
         if (panel, pictures, retrain) != (None, None, False):
             raise UserError(f"{display}: --panel, --pictures and --retrain are not for a session, which has its study")
         source = twins.of_session(Path(display))
         twins.refuse(name, source, output)
         return source
+    if display.endswith((".yaml", ".yml")) and not Path(display).is_file():
+        raise UserError(f"{display}: no such file")
     if panel and twins.is_bench(Path(display)):
         raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
     text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES)
@@ -85,10 +91,13 @@ def _photographs(
     write_atomically(config, text.encode())
     try:
         twins.refuse(name, twins.in_folder(output, artifacts), output)
-    except UserError:
+    except UserError as error:
         if is_new:
             config.unlink()
-        raise
+            with suppress(OSError):  # where it was made for this
+                output.joinpath(WORK).rmdir()
+                output.rmdir()
+        raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
     _run(output, PHOTOGRAPHS, artifacts, retrain)
     return twins.in_folder(output, artifacts)
 

@@ -97,7 +97,7 @@ def quantities(rows: Sequence[Row]) -> Markdown:
         same = {row.get("colour"): row for row in rows if row["name"] == name}
         first = next(iter(same.values()))
         words = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
-        off = [abs(difference(row)) for row in same.values() if _known(row.get("truth"))]
+        off = [abs(difference(row)) for row in same.values() if _known(row.get("truth")) and row.get("seen", True)]
         lines.append(
             [
                 words,
@@ -122,7 +122,9 @@ def _colour(colour: int | None) -> str:
 
 
 def _cell(row: Row, told: bool) -> str:
-    """The value; and the truth, where any of the table is told."""
+    """The value; and the truth, where any of the table is told; of what no capture shows, neither."""
+    if row.get("seen") is False:
+        return "–"
     truth = f"{row['truth']:.3f}" if _known(row.get("truth")) else "–"
     return f"{row['value']:.3f}" + f" ({truth})" * told
 
