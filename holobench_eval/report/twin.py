@@ -87,15 +87,7 @@ def _signed(estimate: Estimate) -> str:
 def _methods(found: Trial) -> Markdown:
     colours = next(iter(found.twin.values())).gaps.shape[1] - 1
     names = COLOURS if colours == len(COLOURS) else COLOURS[:0]
-    head = [
-        "method",
-        "display [dB]",
-        "twin [dB]",
-        "twin less display [dB]",
-        "against a photograph [dB]",
-        "further [dB]",
-        *names,
-    ]
+    head = ["method", *(f"{name} [dB]" for name in COLUMNS), *names]
     order = sorted(found.display, key=lambda label: -float(found.display[label].mean()))
     lines = []
     for label in order:
@@ -154,11 +146,11 @@ def _use(found: Trial, profile: Path) -> Iterable[str | Markdown]:
 
 
 def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: Trial) -> None:
-    (cells,), on_twins = photographed.cells().values(), trial.cells()
-    item = found.pictures[0]
+    item, on_twins = found.pictures[0], trial.cells()
     target, rows = photographed.target(item), {}
-    for label in dict.fromkeys((photographed.study.baseline, found.label)):
-        first, second = (photographed.captures(cell)[0] for cell in cells[label, item][:2])
+    twice = [label for label, each in photographed.twice if each == item]
+    for label in dict.fromkeys(label for label in (photographed.study.baseline, found.label) if label in twice):
+        first, second = photographed.pair(label, item)
         twin = trial.captures(on_twins[found.name][label, item][0])[0]
         shown = match(first, target)[0]
         rows[label] = shown.numpy(), match(second, shown)[0].numpy(), match(twin, shown)[0].numpy()

@@ -29,7 +29,7 @@ from .model import TwinCamera, TwinModel
 QUANTILE = 2.35  # of Student's t, 90 % of which lie within: a spread over three colours
 FAINTEST = 0.01  # of what a fit leaves of a capture: a smaller change is not seen
 MISFIT = 1 / 3  # of the usual error of a quantity: left on leto-aged, leto-2020-01 and leto-2020-03, 144 px
-LOOKED_AT = 6  # captures of each kind
+LOOKED_AT = 6  # captures, or a few more, of all kinds
 
 
 def estimates(learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:

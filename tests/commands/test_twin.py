@@ -75,6 +75,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["leto-aged", "-o", "my lab"], "my lab: the folder names the display; expected a-z"),
         (["empty", "-o", "lab"], "empty: a folder without manifest.json"),
         (["pluto-fourier", "-o", "lab"], "Fresnel plane"),
+        (["ideal", "-o", "odd"], "odd.yaml: is no twin of 'ideal'"),
         (["mine.yaml", "-o", "."], "mine.yaml: is no twin of 'mine'; choose another --output"),
         (["eye.yaml", "-o", "lab"], "'eye': a display that is seen through a known lens has no twin"),
         (["bench.yaml", "-o", "lab", "--panel", "128", "128"], "bench.yaml: a bench has the panel that its file says"),
@@ -91,6 +92,8 @@ def test_what_cannot_be_is_one_line(
     folder.mkdir()
     monkeypatch.chdir(folder)
     Path("empty").mkdir()
+    Path("odd").mkdir()
+    Path("odd/odd.yaml").write_text("twin: many\n")
     Path("mine.yaml").write_text("like: leto-aged\nname: mine\n")
     Path("eye.yaml").write_text("like: leto-2020\nname: eye\neye: {focus: [0.2, 0, 0], known: true}\n")
     Path("bench.yaml").write_text("name: mine\nslm: {}\n")

@@ -110,9 +110,8 @@ class Trial:
 
 def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
     """Compare the photographs of a display with the captures of its twin. UserError: a cell of either is missing."""
-    (cells,) = photographed.cells().values()
-    pictures = tuple(dict.fromkeys(item for _, item in cells))
-    labels = tuple(dict.fromkeys(label for label, _ in cells))
+    pictures = tuple(dict.fromkeys(item for _, item in photographed.own))
+    labels = tuple(dict.fromkeys(label for label, _ in photographed.own))
     targets = {item: photographed.target(item) for item in pictures}
     display: dict[str, NDArray[np.float64]] = {}
     twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name)}
@@ -138,8 +137,7 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
 def same(photographed: Photographed, label: str, item: str) -> list[Cell]:
     """The photographs of the hologram that is shown on the twin: all repeats, or the first of a method whose repeats
     have random starts."""
-    (cells,) = photographed.cells().values()
-    return cells[label, item][: None if (label, item) in photographed.twice else 1]
+    return photographed.own[label, item][: None if (label, item) in photographed.twice else 1]
 
 
 @dataclass(frozen=True)

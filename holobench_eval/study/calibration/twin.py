@@ -111,6 +111,11 @@ class Photographed:
                 found.setdefault(cell.condition, {}).setdefault((label, cell.target), []).append(cell)
         return found
 
+    @cached_property
+    def own(self) -> dict[tuple[str, str], list[Cell]]:
+        """``cells`` of its one display."""
+        return self.cells()[self.display.name]
+
     def captures(self, cell: Cell) -> tuple[Tensor, float]:
         """The kept capture ``(C, h, w)`` of a cell, and its PSNR [dB]. UserError: it was not taken, or is damaged."""
         record, kept = self.store.read(cell.id), kept_capture(self.store.capture(cell.id))
@@ -131,10 +136,9 @@ class Photographed:
     def twice(self) -> list[tuple[str, str]]:
         """Labels and targets whose hologram was photographed twice: a method with random starts finds another one in
         each repeat. UserError: there are none."""
-        (cells,) = self.cells().values()
         same = [
             (label, item)
-            for (label, item), own in cells.items()
+            for (label, item), own in self.own.items()
             if len(own) > 1 and torch.equal(self.phase(label, item), self.phase(label, item, own[1].repeat))
         ]
         if not same:
@@ -143,8 +147,7 @@ class Photographed:
 
     def pair(self, label: str, item: str) -> list[Tensor]:
         """Two photographs of one of ``twice``."""
-        (cells,) = self.cells().values()
-        return [self.captures(cell)[0] for cell in cells[label, item][:2]]
+        return [self.captures(cell)[0] for cell in self.own[label, item][:2]]
 
     def phase(self, label: str, item: str, repeat: int = 0) -> Tensor:
         """A hologram ``(C, H, W)`` [rad] that the study has saved. UserError: it has not."""
@@ -191,7 +194,8 @@ def refuse(name: str, photographed: Photographed, folder: Path) -> None:
         raise UserError(f"'{display.name}': a display that is seen through a known lens has no twin")
     _ = photographed.label
     own = folder / f"{file_name(name)}.yaml"
-    if own.is_file() and (load(own).data.get("twin") or {}).get("of") != display.name:
+    twin = load(own).data.get("twin") if own.is_file() else {"of": display.name}
+    if not isinstance(twin, Mapping) or twin.get("of") != display.name:
         raise UserError(f"{own}: is no twin of '{display.name}'; choose another --output")
 
 
@@ -214,8 +218,7 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     Of ``turned`` the maps over the panel are turned by half a turn, ``blank`` has no maps. The camera's noise is that
     of two photographs. Returns the profile of the twin, whose maps are beside it. UserError: it cannot be registered.
     """
-    (cells,) = photographed.cells().values()
-    for kind, found in zip(("methods", "pictures"), map(set, zip(*cells, strict=True)), strict=True):
+    for kind, found in zip(("methods", "pictures"), map(set, zip(*photographed.own, strict=True)), strict=True):
         if len(found) < FEWEST:
             raise UserError(f"{photographed.study.file}: {len(found)} {kind}; a twin is tried on {FEWEST} or more")
     trial = folder / WORK / TRIAL
@@ -295,7 +298,7 @@ def publish(profile: Profile, folder: Path) -> Path:
     held = load_maps(profile.maps, folder / WORK / TRIAL, _sizes(profile))
     path = folder / f"{file_name(profile.name)}.yaml"
     before = load(path).data if path.is_file() else {}
-    version = int(before.get("version", 0))
+    version = before["version"] if isinstance(before.get("version"), int) else 0
     write_profile(held, replace(profile, version=max(1, version)), folder)
     if before and load(path).data != before:
         write_profile(held, replace(profile, version=version + 1), folder)
