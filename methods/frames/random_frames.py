@@ -46,10 +46,14 @@ class FromRandomFrames(ByColour):
 
     def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         """The frames of the least loss that was seen."""
+        return self.descend(self.loss(target, bench, channel), target, bench, channel)
+
+    def descend(self, loss: Callable[[Tensor], Tensor], target: Tensor, bench: Bench, channel: int) -> Tensor:
+        """`retrieve` for a loss of the frames of every target ``(B, h, w)``."""
         draw = bench.generator("random frames", channel)
         start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
         start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # the same for all of a batch
-        frames = adam(start, by_autograd(self.loss(target, bench, channel)), self.iterations, self.step)
+        frames = adam(start, by_autograd(loss), self.iterations, self.step)
         return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
 
 

@@ -48,7 +48,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "nearest_level": {"start": _EARLY},
     **{
         key: {"iterations": 6}
-        for key in ("straight_through", "gumbel", "partially_coherent", "random_frames", "light_field")
+        for key in ("straight_through", "gumbel", "partially_coherent", "random_frames", "light_field", "focal_stack")
     },
     "torchoptics_adam": {"iterations": 6},
     "oracle": {"iterations": 4, "rounds": 2},  # longer descents amplify rounding

@@ -43,6 +43,7 @@ REGISTRY = {
     "gumbel": (SKY, "*"),
     "random_frames": (SKY, "p"),
     "light_field": (SKY, "X"),
+    "focal_stack": (SKY, "h"),
     "partially_coherent": (SKY, "v"),
     "hil": (MAGENTA, "P"),
     "hil_tuned": (MAGENTA, "X"),
