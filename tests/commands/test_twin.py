@@ -74,7 +74,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["nosuch", "-o", "lab"], "unknown profile 'nosuch'"),
         (["leto-aged", "-o", "my lab"], "my lab: the folder names the display; expected a-z"),
         (["empty", "-o", "lab"], "empty: a folder without manifest.json"),
-        (["pluto-fourier", "-o", "lab"], "Fresnel plane"),
+        (["pluto-fourier", "-o", "lab"], "pluto-fourier: has its picture in a Fourier plane; the model of a twin"),
         (["ideal", "-o", "odd"], "odd.yaml: is no twin of 'ideal'"),
         (["mine.yaml", "-o", "."], "mine.yaml: is no twin of 'mine'; choose another --output"),
         (["eye.yaml", "-o", "lab"], "'eye': a display that is seen through a known lens has no twin"),

@@ -48,9 +48,14 @@ FEWEST = 3  # pictures, and methods: two without a camera, whose difference is c
 
 
 def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
-    """The config of the photographs of a display: a profile, by name or file, or the file of a bench."""
+    """The config of the photographs of a display: a profile, by name or file, or the file of a bench.
+
+    UserError for a display that shows its picture in a Fourier plane.
+    """
     config = yaml.safe_load(shipped_configs()["twin"].read_bytes())
     path = Path(display)
+    if (load_bench_file(path) if is_bench(path) else load_profile(display)).panel.plane == "fourier":
+        raise UserError(f"{display}: has its picture in a Fourier plane; the model of a twin has a Fresnel plane")
     shown = str(path.resolve()) if path.is_file() else display
     config["title"] = f"Photographs for a twin of {path.stem if path.is_file() else display}"
     config["display"] = {"bench": shown} if is_bench(path) else {"profiles": [shown], "panel": list(panel)}
@@ -176,7 +181,12 @@ class Photographed:
 
 def of_session(folder: Path) -> Photographed:
     """The study of a session's folder. UserError as ``study_of``, and for photographs that are not taken yet."""
-    found = Photographed(study_of(folder, read_manifest(folder), None), folder / REPORT, folder / ARTIFACTS)
+    try:
+        study = study_of(folder, read_manifest(folder), None)
+    except UserError as error:
+        told = str(error).partition("; give --study")[0]
+        raise UserError(f"{told}; a twin is learned from a session of the config 'twin'") from None
+    found = Photographed(study, folder / REPORT, folder / ARTIFACTS)
     if any(found.store.read(cell.id) is None for cell in found.plan.cells):
         raise UserError(f"{folder}: photographs are missing; holoeval session import {folder} says which")
     return found
