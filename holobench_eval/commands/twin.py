@@ -83,6 +83,7 @@ def _photographs(
         raise UserError(f"{display}: no such file")
     if panel and twins.is_bench(Path(display)):
         raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
+    twins.refuse_fourier(display)
     text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES)
     config = output / WORK / f"{PHOTOGRAPHS}.yaml"
     is_new = not config.exists()

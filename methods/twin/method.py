@@ -70,7 +70,7 @@ class Twin(ThroughModel):
 
     title: ClassVar[str] = "a twin of the display"
     RATES: ClassVar[Rates] = Rates(model=3e-2, terms=1e-2)
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
     form: ClassVar[frozenset[str]] = FORM | {
         *("quantisation", "sub_pixel_field", "pose", "sensor_area", "blur", "response"),
         *("vignetting", "sensor_response", "shading", "panel_dust", "roughness", "fringes"),

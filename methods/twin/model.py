@@ -20,7 +20,7 @@ from ...display.simulated.stages.panel import straight_through_level
 from ...display.simulated.stages.propagation import sample_weights
 from ...optics.phase import TAU
 from ...optics.phasor import phasor, squared_modulus
-from ..calibrated.display_model import SAMPLES, DisplayModel, Maps, enlarged, sub_samples
+from ..calibrated.display_model import SAMPLES, DisplayModel, Maps, enlarged, pupil_modes, sub_samples
 from ..calibrated.terms import ImageTerms, spread
 
 FINER = 2  # samples of the image, a pixel and axis, at which its intensity is not undersampled
@@ -52,6 +52,8 @@ class TwinModel(DisplayModel):
         rows, columns = sample_weights(spec.shape, SAMPLES, spec.blaze, hold=True)
         self.register_buffer("rows", rows, persistent=False)
         self.register_buffer("columns", columns, persistent=False)
+        wide = (2 * spec.shape[0], 2 * spec.shape[1])  # what leaves the picture does not come back at its other side
+        self.register_buffer("modes", pupil_modes(wide, spec.pupil), persistent=False)
 
     def over_panel(self, phase: Tensor) -> Tensor:
         """See the class."""
@@ -73,10 +75,12 @@ class TwinModel(DisplayModel):
         return super()._driven(straight_through_level(phase, bits) * (TAU / 2**bits))
 
     def _image(self, shown: Tensor, maps: Maps, offsets: Sequence[float]) -> Tensor:
+        height, width = shown.shape[1:]
         panel = self._panel(shown, maps)
         models = (self._propagator(colour, offset) for colour, offset in enumerate(offsets))
         plane = torch.stack([model.forward(field) for model, field in zip(models, panel, strict=True)])
-        return torch.fft.ifft2(torch.fft.fft2(plane) * maps.pupil) * maps.amplitude
+        spectrum = torch.fft.fft2(plane, s=maps.pupil.shape[1:]) * maps.pupil
+        return torch.fft.ifft2(spectrum)[:, :height, :width] * maps.amplitude
 
     def _panel(self, shown: Tensor, maps: Maps) -> Tensor:
         """Field ``(C, H, W)`` of pixels that have the spectrum of all sub-samples of the phase that they show."""

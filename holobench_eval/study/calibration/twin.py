@@ -48,19 +48,21 @@ FEWEST = 3  # pictures, and methods: two without a camera, whose difference is c
 
 
 def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
-    """The config of the photographs of a display: a profile, by name or file, or the file of a bench.
-
-    UserError for a display that shows its picture in a Fourier plane.
-    """
+    """The config of the photographs of a display: a profile, by name or file, or the file of a bench."""
     config = yaml.safe_load(shipped_configs()["twin"].read_bytes())
     path = Path(display)
-    if (load_bench_file(path) if is_bench(path) else load_profile(display)).panel.plane == "fourier":
-        raise UserError(f"{display}: has its picture in a Fourier plane; the model of a twin has a Fresnel plane")
     shown = str(path.resolve()) if path.is_file() else display
     config["title"] = f"Photographs for a twin of {path.stem if path.is_file() else display}"
     config["display"] = {"bench": shown} if is_bench(path) else {"profiles": [shown], "panel": list(panel)}
     config["targets"]["params"]["count"] = pictures
     return yaml.safe_dump(config, sort_keys=False)
+
+
+def refuse_fourier(display: str) -> None:
+    """UserError for a display, as `study_text` takes it, whose picture is in a Fourier plane."""
+    path = Path(display)
+    if (load_bench_file(path) if is_bench(path) else load_profile(display)).panel.plane == "fourier":
+        raise UserError(f"{display}: has its picture in a Fourier plane; the model of a twin has a Fresnel plane")
 
 
 def is_bench(path: Path) -> bool:
