@@ -110,24 +110,9 @@ class PhaseGamma(ABC):
         return dict(zip(gammas, bench.kept(f"search {search}", capture)["errors"], strict=True))
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of the open-loop method, with the display's gamma.
+        """Phases ``(B, C, H, W)`` [rad] of the open-loop method, with the display's gamma.
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and what `prepare` returned.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Where the method was not trained.
+        target: linear intensity ``(B, C, h, w)`` in [0, 1]. CellError: it was not trained.
         """
         return corrected(bench.solved(self.of, target), bench.learned["gamma"], bench.spec)
 

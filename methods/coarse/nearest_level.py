@@ -31,20 +31,7 @@ class NearestLevel:
     title: ClassVar[str] = "Wirtinger holography on the nearest levels"
 
     def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Phases that show the nearest levels.
-
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-        """
+        """Linear intensity ``(B, C, h, w)`` to phases ``(B, C, H, W)`` [rad] that show the nearest levels."""
         colours = enumerate(bench.solved(self.start, target).unbind(1))
         return torch.stack([_rounded(phase, Levels(bench.spec, channel, phase)) for channel, phase in colours], dim=1)
 

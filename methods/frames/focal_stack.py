@@ -36,22 +36,7 @@ class FocalStack(FromRandomFrames):
         return self._stack_loss(target[None], (0.0,), bench, channel)
 
     def solve_planes(self, targets: Tensor, offsets: Sequence[float], bench: Bench) -> Tensor:
-        """One hologram for several planes.
-
-        Parameters
-        ----------
-        targets : Tensor
-            Linear intensities ``(P, C, h, w)`` in [0, 1].
-        offsets : sequence of float
-            Distances of the planes from that of the display [m]; positive ones are farther from the panel.
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad].
-        """
+        """As ``MultiPlane.solve_planes``: phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad]."""
         solved = []
         for channel, stack in enumerate(targets.unbind(1)):
             loss = self._stack_loss(stack[:, None], offsets, bench, channel)

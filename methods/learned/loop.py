@@ -85,26 +85,10 @@ class LearnedLoop(ABC, Generic[A]):
         return {**approximator.learned(), "fell_back": fell_back(self.fallback, bench, solve), "left_out": lacks}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of least loss (Eq. 22) in the captures that the approximator predicts.
+        """Phases ``(B, C, H, W)`` [rad] of least loss (Eq. 22) in the captures that the approximator predicts.
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and what `prepare` returned.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Where the method was not trained.
-        UserError
-            Where what was learned belongs to another approximator.
+        target: linear intensity ``(B, C, h, w)`` in [0, 1]. CellError: it was not trained; UserError: what was learned
+        belongs to another approximator.
         """
         if bench.learned["fell_back"]:
             return bench.solved(WIRTINGER, target)

@@ -103,26 +103,10 @@ class OnePass(ABC):
         return {"network": network.state_dict()}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases by one pass of the network.
+        """Phases ``(B, C, H, W)`` [rad] by one pass of the network.
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and what `prepare` returned.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Where the method was not trained.
-        UserError
-            Where what was learned are the weights of another network.
+        target: linear intensity ``(B, C, h, w)`` in [0, 1]. CellError: it was not trained; UserError: what was learned
+        are the weights of another network.
         """
         network = self._fresh(bench)
         with refuse_other_weights():

@@ -152,24 +152,9 @@ class OnlineLoop(ABC):
     version: ClassVar[int] = 2
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """Phases of least captured error.
+        """Phases ``(B, C, H, W)`` [rad] of least captured error.
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and a metered camera.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Without a camera.
+        target: linear intensity ``(B, C, h, w)`` in [0, 1]. CellError: without a camera.
         """
         pairs = enumerate(target)
         return torch.stack([self._solved(image, bench, len(target), index) for index, image in pairs])

@@ -93,24 +93,9 @@ class WirtingerVeil:
         return {"share": share, "reach": reach}
 
     def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
-        """The phase of the least loss that was seen through the veil.
+        """Phases ``(B, C, H, W)`` [rad] of the least loss that was seen through the veil.
 
-        Parameters
-        ----------
-        target : Tensor
-            Linear intensity ``(B, C, h, w)`` in [0, 1].
-        bench : MeteredDisplay
-            Nominal optics in SI units, and what `prepare` returned.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(B, C, H, W)`` [rad].
-
-        Raises
-        ------
-        CellError
-            Where the method was not trained.
+        target: linear intensity ``(B, C, h, w)`` in [0, 1]. CellError: it was not trained.
         """
         share, reach = bench.learned["share"], bench.learned["reach"]
 
