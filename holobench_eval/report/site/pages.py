@@ -125,7 +125,9 @@ def _shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
 
 
 def _identity(source: Source, name: str) -> tuple[str, str]:
-    """Title and description of a display: those of this package, or of another, that has it by this digest.
+    """Title and description of a display, and of a twin how far it can be trusted.
+
+    They are those of this package, or of another, that has the display by this digest.
 
     Another display or version has the beginning of its digest beside its name, or its lab.
     """
@@ -135,7 +137,8 @@ def _identity(source: Source, name: str) -> tuple[str, str]:
     for shown in [*known, *installed()] if kind == "simulated" else ():
         with suppress(UserError):  # of others' files
             if (profile := load_profile(shown)).digest == digest:
-                return shown, profile.description
+                trust = profile.twin.words
+                return shown, f"{profile.description}{f' It is {trust}.' if trust else ''}"
     other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
     return f"{name} ({other})", "Another display, or another version of one, than is installed here."
 

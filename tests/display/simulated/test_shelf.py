@@ -70,13 +70,14 @@ def test_the_list_has_a_line_for_each_display_with_its_panel_and_origin(install,
 
 
 def test_the_site_has_a_card_of_an_installed_display_by_its_name_and_words(install, tmp_path):
-    install("lab_x", bench=MINE.format(like="leto-aged", name="leto-aged"))
+    trust = "twin: {of: leto-aged, photographs: 59, pictures: 8, gap: {wirtinger: 1.0}, flattery: 0.7}\n"
+    install("lab_x", bench=MINE.format(like="leto-aged", name="leto-aged") + trust)
     records = synthetic.study(tmp_path / "study", size=16, targets=TARGETS)
     digests = {"leto-aged": load_profile("lab-x/bench").digest, "ideal": load_profile("ideal").digest}
     known = {"profiles": {name: {"version": 1, "sha256": sha256} for name, sha256 in digests.items()}}
     write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "displays" / f"{slug('lab-x/bench')}.html").read_text()
-    assert "A display of lab X." in page
+    assert "A display of lab X. It is a twin of leto-aged, trained with 59 photographs" in page
     assert "lab-x/bench" in page
 
 
