@@ -13,7 +13,7 @@ from ...display.api import DisplaySpec
 from ...display.estimates import Estimate, disc, estimate, focusing, reach, stray, stroke, undiffracted, zernike_waves
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES, zernike
-from .display_model import FORM, KNOTS, MODES, DisplayModel, enlarged
+from .display_model import FORM, KNOTS, DisplayModel, enlarged
 
 
 class Diagnosed:
@@ -73,10 +73,10 @@ def _panel_estimates(model: DisplayModel, colour: int) -> list[Estimate]:
 
 def _optics_estimates(model: DisplayModel, colour: int) -> list[Estimate]:
     spec, (y, x) = model.spec, disc()
-    modes = torch.stack([zernike(NAMES[name], y, x) for name in MODES])
+    modes = torch.stack([zernike(NAMES[name], y, x) for name in model.MODES])
     lens = focusing(
         enlarged(model.angle, spec.shape)[colour],
         reach(spec.wavelengths[colour], spec.distance, spec.pitch, spec.pupil),
     )
     waves = zernike_waves(model.aberration[colour].double() @ modes + lens)
-    return [estimate(name, colour, waves[name]) for name in MODES]
+    return [estimate(name, colour, waves[name]) for name in model.MODES]

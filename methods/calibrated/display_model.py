@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -68,6 +68,7 @@ class DisplayModel(nn.Module):
     camera's gain.
     """
 
+    MODES: ClassVar[Sequence[str]] = MODES
     ramp: Tensor | None
 
     def __init__(self, spec: DisplaySpec) -> None:
@@ -80,9 +81,9 @@ class DisplayModel(nn.Module):
         self.amplitude = nn.Parameter(torch.zeros(channels, SOURCE_GRID, SOURCE_GRID))
         self.angle = nn.Parameter(torch.zeros(channels, SOURCE_GRID, SOURCE_GRID))
         self.undiffracted = nn.Parameter(torch.zeros(channels, 2))
-        self.aberration = nn.Parameter(torch.zeros(channels, len(MODES)))
+        self.aberration = nn.Parameter(torch.zeros(channels, len(self.MODES)))
         self.brightness = nn.Parameter(torch.zeros(channels))
-        self.register_buffer("modes", pupil_modes(spec.shape, spec.pupil), persistent=False)
+        self.register_buffer("modes", pupil_modes(self.MODES, spec.shape, spec.pupil), persistent=False)
         self.register_buffer("ramp", blaze(spec.shape, spec.blaze) if any(spec.blaze) else None, persistent=False)
         self._held: tuple[Tensor, Maps] | None = None
 
@@ -212,9 +213,9 @@ def _bicubic(images: Tensor, shape: tuple[int, int]) -> Tensor:
     return functional.interpolate(images, size=shape, mode="bicubic", align_corners=True)
 
 
-def pupil_modes(shape: tuple[int, int], pupil: float | None) -> Tensor:
-    """The polynomials of ``MODES`` on the frequencies of an image ``(h, w)``, zero outside the iris."""
+def pupil_modes(names: Sequence[str], shape: tuple[int, int], pupil: float | None) -> Tensor:
+    """Polynomials of Zernike on the frequencies of an image ``(h, w)``, zero outside the iris."""
     edge = (pupil or 1.0) / 2  # cycles a pixel
     y, x = torch.meshgrid(*(torch.fft.fftfreq(side, dtype=torch.float64) / edge for side in shape), indexing="ij")
     inside = (torch.hypot(x, y) <= 1).double()
-    return torch.stack([zernike(NAMES[name], y * inside, x * inside) * inside for name in MODES]).float()
+    return torch.stack([zernike(NAMES[name], y * inside, x * inside) * inside for name in names]).float()

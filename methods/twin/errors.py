@@ -22,7 +22,7 @@ from ...display.estimates import QUANTITIES, Estimate
 from ...optics.phase import TAU
 from ..calibrated.approximator import PredictedCapture
 from ..calibrated.diagnosis import diagnose, haze
-from ..calibrated.display_model import KNOTS, MODES
+from ..calibrated.display_model import KNOTS
 from ..learned.samples import Sample
 from .model import TwinCamera, TwinModel
 
@@ -139,5 +139,5 @@ NUDGES: Mapping[str, Nudge] = {
     "light": lambda model, camera, amount: _log(model, "brightness", amount),
     "stray_share": _stray,
     "stray_reach": lambda model, camera, amount: _log(camera, "reach", amount),
-    **{name: _aberration(mode) for mode, name in enumerate(MODES)},
+    **{name: _aberration(mode) for mode, name in enumerate(TwinModel.MODES)},
 }

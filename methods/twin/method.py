@@ -72,7 +72,7 @@ class Twin(ThroughModel):
     RATES: ClassVar[Rates] = Rates(model=3e-2, terms=1e-2)
     version: ClassVar[int] = 3
     form: ClassVar[frozenset[str]] = FORM | {
-        *("quantisation", "sub_pixel_field", "pose", "sensor_area", "blur", "response"),
+        *("trefoil_y", "trefoil_x", "quantisation", "sub_pixel_field", "pose", "sensor_area", "blur", "response"),
         *("vignetting", "sensor_response", "shading", "panel_dust", "roughness", "fringes"),
     }
 

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
+from ...display.estimates import MODES as ALL_MODES
 from ...display.simulated.stages.panel import straight_through_level
 from ...display.simulated.stages.propagation import sample_weights
 from ...optics.phase import TAU
@@ -32,11 +33,12 @@ POSE_GRID = 4  # points along an axis of the camera's displacement
 class TwinModel(DisplayModel):
     """Phase ``(C, H, W)`` [rad] to the intensity ``(C, 2 H, 2 W)`` in the image plane, two samples a pixel and axis.
 
-    The parameters are those of ``DisplayModel``, on finer grids, and ``specks``, the dirt of single pixels. A phase is
-    rounded to the levels of the panel, and its gradient passes. Each sub-sample sends its light from its own place and
-    is a small square.
+    The parameters are those of ``DisplayModel``, on finer grids and with trefoil, and ``specks``, the dirt of single
+    pixels. A phase is rounded to the levels of the panel, and its gradient passes. Each sub-sample sends its light from
+    its own place and is a small square.
     """
 
+    MODES: ClassVar[Sequence[str]] = ALL_MODES
     GAIN_GRID: ClassVar[int] = 12
     SOURCE_GRID: ClassVar[int] = 64
     SPECK_GRID: ClassVar[int] = 640  # at most, along an axis: a profile has at most 20 MB of maps
@@ -53,7 +55,7 @@ class TwinModel(DisplayModel):
         self.register_buffer("rows", rows, persistent=False)
         self.register_buffer("columns", columns, persistent=False)
         wide = (2 * spec.shape[0], 2 * spec.shape[1])  # what leaves the picture does not come back at its other side
-        self.register_buffer("modes", pupil_modes(wide, spec.pupil), persistent=False)
+        self.register_buffer("modes", pupil_modes(self.MODES, wide, spec.pupil), persistent=False)
 
     def over_panel(self, phase: Tensor) -> Tensor:
         """See the class."""

@@ -24,7 +24,7 @@ from ...display.simulated.maps import LARGEST
 from ...display.simulated.profile import Profile
 from ...optics.phase import TAU
 from ...optics.zernike import NAMES
-from ..calibrated.display_model import MODES, SAMPLES, enlarged
+from ..calibrated.display_model import SAMPLES, enlarged
 from .model import TwinCamera, TwinModel
 
 DENSE = 8 * (TwinModel.SOURCE_GRID - 1) + 1  # points along an axis of a map: every knot, and seven between two
@@ -109,7 +109,7 @@ def panel_maps(model: TwinModel) -> dict[str, Tensor]:
     finest, specks = (rows, columns), model.dirt((rows, columns))
     levels = torch.arange(2**spec.bits, device=model.table.device) * (TAU / 2**spec.bits)
     aberration = model.aberration.new_zeros(channels, len(NAMES))
-    aberration[:, [NAMES[mode] - 1 for mode in MODES]] = model.aberration
+    aberration[:, [NAMES[mode] - 1 for mode in model.MODES]] = model.aberration
     return {
         "lut.table": model._driven(levels.expand(channels, 1, -1))[:, 0],
         "lut.gain": enlarged(model.gain, size).exp(),

@@ -76,7 +76,7 @@ def speckle() -> Tensor:
 
 @pytest.mark.parametrize("blaze", [(0.0, 0.0), (0.125, 0.25)])
 @pytest.mark.parametrize("pupil", [0.8, 0.45])
-def test_the_display_agrees_with_the_twin_within_two_percent_of_the_light(
+def test_the_display_agrees_with_the_twin_within_two_percent_and_three_with_a_blaze(
     tmp_path: Path, pupil: float, blaze: tuple[float, float]
 ) -> None:
     display = base(pupil, blaze)
@@ -84,9 +84,9 @@ def test_the_display_agrees_with_the_twin_within_two_percent_of_the_light(
     path = to_profile(model, camera, named(display, "lab"), tmp_path)
     picture = Photographs(names=("coffee",)).load("coffee", display.spec().region.shape)[None].float()
     hologram = Wirtinger(iterations=50).solve(picture, Bench(display.spec()))[0]
-    for phase, most in ((smooth(), 0.02), (hologram, 0.02), (speckle(), 0.02 if not any(blaze) else 0.03)):
+    for phase in (smooth(), hologram, speckle()):
         predicted, shown = both(model, camera, path, phase)
-        assert float((shown - predicted).norm() / predicted.norm()) < most
+        assert float((shown - predicted).norm() / predicted.norm()) < (0.03 if any(blaze) else 0.02)
 
 
 @pytest.mark.parametrize("bits", [8, 1])
