@@ -24,6 +24,8 @@ EDGE = 0.02  # of a span, by which the values of a phase in another unit may mis
 UNITS = {  # what values in a span may be, and what makes radians of them
     (0.0, 1.0): ("turns or amplitudes", math.tau),
     (-0.5, 0.5): ("turns", math.tau),
+    (0.0, 2.0): ("half turns", math.pi),
+    (-1.0, 1.0): ("half turns", math.pi),
     (0.0, 256.0): ("levels of 8 bits", math.tau / 256),
     (0.0, 360.0): ("degrees", math.tau / 360),
     (-180.0, 180.0): ("degrees", math.tau / 360),

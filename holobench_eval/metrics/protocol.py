@@ -24,6 +24,7 @@ from .speckle import speckle_contrast
 
 VERSION = "v2"
 SMALLEST_SCORED = 16
+NEARLY_BLACK = 1 / 255  # of white; the brightest of a target has more
 DIMMEST = 0.05  # of the light of the brightest colour; no colour of the photographs here has less than 0.07
 
 Image = Tensor | NDArray[np.floating]
@@ -228,8 +229,9 @@ def _as_pair(capture: Image, target: Image) -> tuple[Tensor, Tensor]:
     low, high = (float(value) for value in wanted.aminmax())
     if not (low >= -1e-6 and high <= 1 + 1e-6):
         raise ValueError(f"target values must be in [0, 1], got [{low:.6g}, {high:.6g}]")
-    if high <= 0:
-        raise ValueError("the target is black; expected light in at least one of its colours")
+    if high < NEARLY_BLACK:  # whatever is photographed, it is near to such a target
+        dim = f"has at most {high:.2g} of white" if high > 0 else "is black"
+        raise ValueError(f"the target {dim}; expected light in at least one of its colours")
     return light, wanted if low >= 0 and high <= 1 else wanted.clamp(0, 1)  # a copy of a large one counts
 
 

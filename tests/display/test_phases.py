@@ -45,6 +45,8 @@ ODD = {
     "levels": (lambda phase: LEVELS * phase, "better read as levels of 8 bits"),
     "turns": (lambda phase: phase / TAU, "better read as turns"),
     "turns of both signs": (lambda phase: (phase / TAU + 0.5) % 1 - 0.5, "better read as turns"),
+    "half turns": (lambda phase: phase / math.pi, "better read as half turns"),
+    "half turns of both signs": (lambda phase: (phase / math.pi + 1) % 2 - 1, "better read as half turns"),
     "levels over their number": (lambda phase: (phase / TAU * 255).round() / 255, "better read as turns"),
     "noise": (lambda phase: 6 * torch.rand(phase.shape, generator=DRAW.manual_seed(1)), "makes nothing like"),
 }

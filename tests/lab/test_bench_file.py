@@ -34,6 +34,7 @@ def test_a_panel_of_equal_steps_or_with_a_table_is_read(tmp_path: Path) -> None:
         ("1080, 1920", "32, 1920", ":4:10: a panel has at least 64 pixels a side"),
         ("bits: 8", "bits: 4", ":8:9: levels are written with 8 bits, got 4"),
         ("bits: 8", "bits: 8\n  levels: [0, 100]", ":9:11: the table has 2 entries; a panel of 8 bits has 256"),
+        ("bits: 8", "bits: 8\n  blaze: [0.7, 50.3]", ":9:10: no panel shows more than 0.5 cycles a pixel"),
         ("bits: 8", "bits: 8\n  linewidth: [1e-9, 1e-9]", ":9:14: there are 2 widths; the panel has 1 wavelengths"),
     ],
 )

@@ -234,6 +234,8 @@ def test_wrong_shapes_ranges_and_names_are_errors(capture: Tensor, target: Tenso
         score(capture, 255 * target)
     with pytest.raises(ValueError, match="the target is black; expected light in at least one of its colours"):
         score(capture, torch.zeros_like(target))
+    with pytest.raises(ValueError, match=r"the target has at most 0\.001 of white"):
+        score(capture, 1e-3 * target / target.max())
     with pytest.raises(ValueError, match="blur width"):
         score(capture, target, metrics=QUICK, blur=(0.0,))
     with pytest.raises(UserError, match="did you mean 'psnr'"):

@@ -6,15 +6,21 @@ has its interval, sample and p value, and says whether it is shown.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ...core.errors import one_line
+from ...study.folders.files import named
 from .column import DONE
 from .results import CONSTANT, Results
 from .scores import Score
 from .statistics import Estimate, PairedTest
 from .text import words
+
+INSTALLED = frozenset({"site-packages", "dist-packages"})  # folders of packages that pip has installed
 
 
 def difference(score: Score, estimate: Estimate) -> str:
@@ -92,6 +98,18 @@ def _dominating(results: Results, label: str, condition: str) -> str:
     gain = results.estimate(results.values(label, condition) - results.values(rival, condition))
     least = gain.low if results.headline.sign > 0 else gain.high
     return "" if rival == label or results.headline.better(least, 0.0) else rival
+
+
+def uncovered(records: Sequence[Mapping[str, Any]]) -> str:
+    """Which files methods were seen to read that no cell is named after; empty for none. Installed ones do not count:
+    their packages have versions."""
+    found: dict[str, dict[str, None]] = {}
+    for record in records:
+        own = [name for name in record.get("uncovered") or () if not INSTALLED.intersection(Path(name).parts)]
+        found.setdefault(str(record["label"]), {}).update(dict.fromkeys(map(one_line, own)))
+    parts = [f"{label} reads {named(list(names))}" for label, names in found.items() if names]
+    remedy = "a change there is not noticed; keep such files beside the config, or choose another --output after it"
+    return f"Not covered: {'; '.join(parts)}: {remedy}." if parts else ""
 
 
 def remarks(results: Results) -> list[str]:

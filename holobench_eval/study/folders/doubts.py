@@ -41,7 +41,10 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
             f"the order of methods.{remedy}"
         )
     if dim := [
-        record for record in captures if record.values().get("darkest", 0.0) < -LIFTED and _has_dark(record, folders)
+        record
+        for record in captures
+        if record.values().get("darkest", 0.0) < -LIFTED
+        and (record.capture["values"] == "linear" or folders.captures[record.label, record.target].dark is not None)
     ]:
         shares = named([f"{_name(record)} {-record.values()['darkest']:.0%}" for record in dim])
         yield (
@@ -55,10 +58,6 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
-
-
-def _has_dark(record: Record, folders: Folders) -> bool:
-    return folders.captures[record.label, record.target].dark is not None
 
 
 def _remedy(record: Record) -> str:

@@ -111,6 +111,8 @@ class Panel(Stage):
             yield "linewidth", f"there are {widths} widths; the panel has {colours} wavelengths"
         if max(map(abs, self.region_offset)) > (1 - self.region) / 2:
             yield "region_offset", f"the region is beyond the picture; up to {(1 - self.region) / 2:.4g} to each side"
+        if max(map(abs, self.blaze)) > 0.5:
+            yield "blaze", "no panel shows more than 0.5 cycles a pixel, a period of two pixels"
         if self.plane == "fourier" and any(self.blaze):
             yield "blaze", "the picture of a Fourier plane is placed beside the zero order by region_offset, not blaze"
 
