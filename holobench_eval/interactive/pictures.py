@@ -22,6 +22,8 @@ from ..methods.files.correction import on_panel
 from ..metrics import catalogue, match
 from ..metrics import score as _score
 from ..optics.colour import srgb_encode
+from ..study.folders.doubts import LIFTED
+from ..study.folders.exposure import darkest
 from .described import Scores, refuse_swapped
 from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of
 
@@ -77,6 +79,9 @@ def score(
     if lost:
         rows, columns = light.shape[1:]
         raise UserError(f"metrics: {', '.join(lost)} cannot be computed here of {rows} x {columns} pixels")
+    if darkest(light, wanted) < -LIFTED:
+        text = f"the capture is darker than the target where it is darkest, by more than {LIFTED:.0%} of its white"
+        warnings.warn(f"{text}: dark counts that are too high do that", stacklevel=2)
     return Scores(found)
 
 
