@@ -23,8 +23,7 @@ ROWS = {  # of the table of a study, in its order
         "double_phase",
     ),
     "board": (
-        *("online_camera", "twin", "hybrid_model", "hil_plus", "parametric_model", "ccnn, calibrated", "gumbel"),
-        *("gerchberg_saxton, smooth start", "wirtinger", "hil", "double_phase"),
+        *("online_camera", "twin", "hil_plus", "ccnn, calibrated", "gumbel", "wirtinger", "hil", "double_phase"),
     ),
 }
 
