@@ -298,9 +298,10 @@ def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
     assert "\n" not in str(found.value)
 
 
-def test_light_far_below_zero_is_warned_of(target: interactive.Array) -> None:
+@pytest.mark.parametrize("taken", [0.1, 2.0])
+def test_light_far_below_zero_is_warned_of(target: interactive.Array, taken: float) -> None:
     with pytest.warns(UserWarning, match="darker than the target where it is darkest, by more than 5% of its white"):
-        hb.score(np.asarray(target) - 0.1, target, metrics=["psnr"])
+        hb.score(np.asarray(target) - taken, target, metrics=["psnr"])
 
 
 def test_a_folder_is_no_picture(target: interactive.Array, tmp_path: Path) -> None:

@@ -17,15 +17,10 @@ PAGES = ("README.md", "docs/speed.md")
 BLOCK = re.compile(r"(<!-- board: (\S+): (.*?) -->\n).*?(<!-- /board -->)", re.DOTALL)
 TIMED = re.compile(r"(<!-- timings -->\n).*?(<!-- /timings -->)", re.DOTALL)
 STEP, OURS = "gradient step, 1080x1920, ", "holobench_eval"
-ROWS = {  # of the table of a study, in its order
-    "table3": (
-        *("hybrid_model", "hil_plus", "gerchberg_saxton, smooth start", "wirtinger", "hil", "wirtinger_veil"),
-        "double_phase",
-    ),
-    "board": (
-        *("online_camera", "twin", "hil_plus", "ccnn, calibrated", "gumbel", "wirtinger", "hil", "double_phase"),
-    ),
-}
+ROWS = (  # of the table, in its order
+    *("online_camera", "twin", "hil_plus", "ccnn, calibrated", "gumbel", "gerchberg_saxton, smooth start", "wirtinger"),
+    *("wirtinger_veil", "hil", "double_phase"),
+)
 
 
 def drawn(text: str) -> str:
@@ -44,7 +39,7 @@ def table(study: str, displays: list[str]) -> str:
     heads = [f"`{name}` [{board['headline']['unit']}] | against Wirtinger" for name in displays]
     lines = ["| method (its name here) | photographs | " + " | ".join(heads) + " |"]
     lines.append("|---|---:|" + "---:|---:|" * len(displays))
-    for label in ROWS[study]:
+    for label in ROWS:
         rows = [found[display].get(label) for display in displays]
         row = next(filter(None, rows))
         cells = " | ".join(cell for row in rows for cell in cells_of(row))

@@ -110,8 +110,8 @@ def darkest(image: Tensor, reference: Tensor) -> float:
     """
     means = reference.mean((-2, -1))
     lifted = [
-        float(np.percentile(own, ENDS[0]) * mean / own.mean() - np.percentile(its, ENDS[0]))
+        float(np.percentile(own, ENDS[0]) * mean / abs(own.mean()) - np.percentile(its, ENDS[0]))
         for own, its, mean in zip(image.numpy(), reference.numpy(), means.tolist(), strict=True)
-        if mean >= MUCH * float(means.max()) and own.mean() > 0
+        if mean >= MUCH * float(means.max()) and own.mean() != 0
     ]
     return max(lifted, default=0.0)
