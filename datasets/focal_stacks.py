@@ -43,6 +43,8 @@ SMALL = (48, 64)  # shape of the picture by which an item is checked to have som
 GENERATED = "shapes"
 MOTORCYCLE = "motorcycle_left.png", "motorcycle_disp.npz"
 
+Array = NDArray[np.floating]
+
 Plane = Annotated[float, Interval(ge=-50, le=50)]
 
 
@@ -137,17 +139,27 @@ def _render(
     blur: float,
 ) -> Tensor:
     """``(4, *shape)``: linear light, and the share of it that is in focus."""
-    rows, columns = shape[0] * FINE, shape[1] * FINE
-    picture, nearness = _source(scene)((rows, columns))
+    return refocused(*_source(scene)((shape[0] * FINE, shape[1] * FINE)), plane, depth, blur, in_focus)
+
+
+def refocused(
+    picture: Array, nearness: Array, plane: float, depth: tuple[float, float], blur: float, in_focus: float = 0.0
+) -> Tensor:
+    """``(4, h, w)``: linear light for an eye that focuses on a plane [mm], and the share of it that is in focus.
+
+    picture, nearness: ``(FINE h, FINE w, 3)`` and ``(FINE h, FINE w)``, see ``Source``; depth: far and near end [mm];
+    blur: as in ``FocalStacks``; in_focus: how far from the plane counts as in focus [mm].
+    """
     layers = np.rint(nearness * (LAYERS - 1)).astype(np.int64)
     away = np.abs(np.linspace(*depth, LAYERS) - plane)
     sharp = (away <= in_focus + 1e-9)[layers]
-    fine = defocus(np.dstack([picture, sharp]).astype(np.float32), layers, (away * blur * rows / 2).tolist())
+    radii = (away * blur * len(picture) / 2).tolist()
+    fine = defocus(np.dstack([picture, sharp]).astype(np.float32), layers, radii)
     return torch.nn.functional.avg_pool2d(torch.from_numpy(fine).permute(2, 0, 1), FINE)
 
 
 # A picture `(h, w, 3)` in linear light and its nearness `(h, w)` from 0, far, to 1, near, for a shape
-Source = Callable[[tuple[int, int]], tuple[NDArray[np.floating], NDArray[np.floating]]]
+Source = Callable[[tuple[int, int]], tuple[Array, Array]]
 
 
 def _title(scene: str) -> str:
@@ -155,17 +167,18 @@ def _title(scene: str) -> str:
     return Path(scene).name or scene
 
 
-def _generated(scene: str) -> bool:
+def generated(scene: str) -> bool:
+    """Whether a scene is one of those that are drawn."""
     number = scene.removeprefix(f"{GENERATED}-")
     return scene == GENERATED or (number != scene and number.isdecimal())
 
 
 def _source(scene: str) -> Source:
-    if _generated(scene):
+    if generated(scene):
         return lambda shape: still_life.still_life(scene, shape)
     picture, nearness = _read(scene, _digest(scene))
 
-    def fitted(shape: tuple[int, int]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    def fitted(shape: tuple[int, int]) -> tuple[Array, Array]:
         # Depths are taken from the nearest pixel: between near and far there is nothing at an edge.
         depth = fit(nearness[None], shape, Image.Resampling.NEAREST)[0]
         return fit(picture, shape).permute(1, 2, 0).numpy(), depth.numpy()
@@ -175,7 +188,7 @@ def _source(scene: str) -> Source:
 
 def _digest(scene: str) -> str:
     """SHA-256 of what a scene is made from."""
-    if _generated(scene):
+    if generated(scene):
         return named_digest(scene, still_life.VERSION)
     return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in _files(scene))).hexdigest()
 

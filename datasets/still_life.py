@@ -112,20 +112,24 @@ class Round:
         return normal, self.pattern.at(around, up)
 
 
-def still_life(name: str, shape: tuple[int, int]) -> tuple[Array, Array]:
+def still_life(name: str, shape: tuple[int, int], parallax: float = 0.0, still: float = 0.0) -> tuple[Array, Array]:
     """Picture ``(h, w, 3)`` linear light in [0, 1] and depth ``(h, w)``, 1 at the near end; ``name`` seeds it.
 
-    Depth is linear in the inverse of the distance, as the focus of an eye is told.
+    Depth is linear in the inverse of the distance, as the focus of an eye is told. parallax: how far the near end moves
+    to the left against the far end, in heights of the picture, as the eye moves to the right; what is at the depth
+    ``still`` stays. Light that surfaces reflect is that towards the eye in the middle.
     """
     surfaces = _surfaces(name)
     rays = _rays(shape)
-    origin = np.zeros((3, 1, 1))
+    eye = parallax * HEIGHT / (1 / NEAREST - 1 / WALL)
+    rays[0] -= eye * (1 / WALL + still * (1 / NEAREST - 1 / WALL))  # an eye moved without turning, its picture shifted
+    origin = np.array([eye, 0.0, 0.0]).reshape(3, 1, 1)
     ways = np.stack([surface.distance(origin, rays) for surface in surfaces])
     nearest, way = ways.argmin(0), ways.min(0)
     picture = np.zeros((*shape, 3))
     for index, surface in enumerate(surfaces):
         seen = nearest == index
-        points = way[seen] * rays[:, seen]
+        points = origin[:, 0] + way[seen] * rays[:, seen]
         picture[seen] = _lit(*surface.appearance(points), points, surfaces[2:]).T
     far, near = 1 / WALL, 1 / NEAREST
     return picture.clip(0, 1), ((1 / way - far) / (near - far)).clip(0, 1)

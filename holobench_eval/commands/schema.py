@@ -21,8 +21,8 @@ def study_schema() -> dict[str, Any]:
     from ..display.simulated.shelf import installed
     from ..metrics import catalogue, control
     from ..study.definition import Study
-    from ..study.focal_stacks import SCORES
     from ..study.identity import SPECKLE
+    from ..study.stacks import SCORES
 
     classes: dict[str, type[Any]] = {"study": Study}
     for kind in plugins.KINDS:

@@ -10,7 +10,7 @@ from ..core.errors import UserError
 from .api import DisplaySpec
 
 Function = Literal[
-    "solve", "solve_planes", "predict", "prepare", "estimates", "available", "files", "external", "blind"
+    "solve", "solve_planes", "solve_views", "predict", "prepare", "estimates", "available", "files", "external", "blind"
 ]
 FUNCTIONS: tuple[Function, ...] = get_args(Function)
 
@@ -20,11 +20,11 @@ class Traits:
     """What the class of a method declares; the defaults are those of a class that declares nothing.
 
     camera: captures while it solves; privileged: may see the simulated bench; trains: learns first; follows: is solved
-    after all others; planes: solves all planes of a scene at once; fresnel: needs the image in a Fresnel plane; form:
-    effects that its model of the display has parameters for; title: its name for people; tuned: what its defaults were
-    chosen on; version: of the numbers it gives; timed: False where its seconds mean nothing; simulates: its phases
-    depend on the code of the simulated bench; functions: those that it has, of which ``blind`` says whether the
-    training of a method with its parameters takes no capture.
+    after all others; planes, views: solves all planes of a scene, or views of a light field, at once; fresnel: needs
+    the image in a Fresnel plane; form: effects that its model of the display has parameters for; title: its name for
+    people; tuned: what its defaults were chosen on; version: of the numbers it gives; timed: False where its seconds
+    mean nothing; simulates: its phases depend on the code of the simulated bench; functions: those that it has, of
+    which ``blind`` says whether the training of a method with its parameters takes no capture.
     """
 
     camera: bool = False
@@ -32,6 +32,7 @@ class Traits:
     trains: bool = False
     follows: bool = False
     planes: bool = False
+    views: bool = False
     fresnel: bool = False
     form: frozenset[str] | None = None
     title: str | None = None

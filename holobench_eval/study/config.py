@@ -22,11 +22,11 @@ from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
-from .definition import PREDICTIONS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
+from .definition import PREDICTIONS, STACKS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import Condition, condition, displays, real_condition
-from .focal_stacks import SCORES, planes_of
 from .identity import SPECKLE
 from .plan import FLOORS, REFERENCE, is_reference
+from .stacks import SCORES, stacks_of
 
 
 def load_study(path: Path | str, changes: Changes | None = None) -> Study:
@@ -112,8 +112,7 @@ def _targets(study: Study, document: Document) -> Targets:
         dataset = study.dataset
         if not dataset.items():
             raise UserError(f"dataset '{study.targets.dataset}' has no images")
-        if study.measure == "focus":
-            planes_of(dataset, study.targets.dataset)
+        stacks_of(dataset, study.targets.dataset, study.measure)
     return replace(study.targets, params=plugins.params_of(dataset), only=_only(study))
 
 
@@ -122,8 +121,8 @@ def _only(study: Study) -> tuple[str, ...]:
     items, changes = study.dataset.items(), study.changes
     if not (changes.targets or changes.limit):
         return ()
-    if study.measure == "focus":
-        raise UserError("--targets, --limit: the targets of focal stacks are planes of scenes, and belong together")
+    if study.measure in STACKS:
+        raise UserError("--targets, --limit: the targets are planes or views of scenes, and belong together")
     wanted = chosen("--targets", changes.targets, items, "target in the dataset") if changes.targets else items
     return tuple([item for item in items if item in wanted][: changes.limit])
 
@@ -155,8 +154,10 @@ def _display(study: Study, document: Document) -> DisplayGrid:
         raise document.error(("display", named[-1] if named else "profiles"), message)
     if display.bench and display.panel is not None:
         raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
-    if display.bench and study.measure == "focus":
-        raise document.error(("measure",), "focal stacks need a camera that refocuses; measure pictures or predictions")
+    if display.bench and study.measure in STACKS:
+        needed = f"a camera that {STACKS[study.measure]}"
+        message = f"measure: {study.measure} needs {needed}; measure pictures or predictions"
+        raise document.error(("measure",), message)
     if learned is None:
         return display
     if study.measure != "picture":
@@ -194,8 +195,9 @@ def _check_profiles(study: Study, document: Document) -> None:
                 raise UserError(f"{both}; list each display once")
             if learned:
                 refuse_plane(isolation.traits(learned.method, study.folder), learned.method, display.spec)
-        if study.measure == "focus" and display.spec.plane == "fourier":
-            raise document.error(("measure",), f"focal stacks need a Fresnel plane; '{profile}' has a Fourier plane")
+        if study.measure in STACKS and display.spec.plane == "fourier":
+            message = f"measure: {study.measure} needs a Fresnel plane; '{profile}' has a Fourier plane"
+            raise document.error(("measure",), message)
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"

@@ -20,9 +20,11 @@ from .changes import Changes
 LEARNED = "learned"  # a config's name for the display that is a trained network
 PanelSide = Annotated[int, Interval(ge=64, le=8192)]
 Text = Annotated[str, MinLen(1)]
-Measure = Literal["picture", "prediction", "error_budget", "focus"]
+Measure = Literal["picture", "prediction", "error_budget", "focus", "views"]
 Isolation = Literal["files", "process", "none"]  # whose methods run in processes of their own
 PREDICTIONS = ("prediction", "error_budget")  # measures of captures that methods predict
+STACKS = {"focus": "refocuses", "views": "has an eye's pupil"}
+"""Measures whose targets are planes or views of scenes, and belong together; what the camera does for them."""
 
 
 @dataclass(frozen=True)
@@ -226,10 +228,11 @@ class Study:
     measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
     captures of the holograms' method against those captures; ``error_budget`` also splits the error of these captures
     by what the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at
-    its own distance. holograms: for predictions, the method whose holograms are captured; training: the images that
-    methods may train on, the same for all; sweeps: changes of the displays at test time. question: what the study asks,
-    which its report answers first, for the methods whose labels the question names; would_change: which result would
-    change the answer; note: a paragraph that the report prints among the limits of its answer.
+    its own distance, and ``views`` light fields, each view from its place. holograms: for predictions, the method whose
+    holograms are captured; training: the images that methods may train on, the same for all; sweeps: changes of the
+    displays at test time. question: what the study asks, which its report answers first, for the methods whose labels
+    the question names; would_change: which result would change the answer; note: a paragraph that the report prints
+    among the limits of its answer.
     seed: of all random numbers, so that the same config gives the same numbers; repeats: how often every cell is
     measured, with new noise; timing: ``shared`` takes a solution's seconds beside whatever other workers do, ``alone``
     measures one solution a row of the tables with nothing beside it; protocol: how captures are scored; baseline: label

@@ -29,8 +29,8 @@ from ..metrics.protocol import VERSION as PROTOCOL
 from ..metrics.speckle import VERSION as SPECKLE_VERSION
 from .definition import Study
 from .displays import Condition
-from .focal_stacks import INFOCUS
-from .focal_stacks import VERSION as INFOCUS_VERSION
+from .stacks import INFOCUS
+from .stacks import VERSION as INFOCUS_VERSION
 from .versions import GIVEN, GIVEN_GRAY, HARNESS, PHOTOGRAPHS
 
 Plain = dict[str, Any]

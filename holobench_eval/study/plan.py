@@ -17,8 +17,8 @@ from ..display.traits import traits_of
 from . import identity, isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
-from .focal_stacks import Showing, Target, offset, planes_a_scene, planes_of, showings
 from .isolation import read_files
+from .stacks import Showing, Target, at_once, showings, stacks_of, targets_a_scene, where
 from .versions import HARNESS, dataset_version, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells, see ``reference_of``
@@ -190,7 +190,7 @@ def plan(study: Study) -> Plan:
     displays_by_source = displays(study)
     ground = _Ground(study)
     references = tuple(_references(study, list(displays_by_source.values())))
-    apart = planes_a_scene(ground.planes) if study.measure == "focus" else 1
+    apart = targets_a_scene(ground.stacks) if ground.stacks else 1
     tasks = [
         ground.floor(display, condition, target, targets[(i + apart) % len(targets)])
         for display, condition in references
@@ -213,9 +213,9 @@ class _Ground:
     study: Study
 
     @cached_property
-    def planes(self) -> dict[str, tuple[str, float]]:
-        """Scene and plane [mm] of every target of focal stacks."""
-        return planes_of(self.study.dataset, self.study.targets.dataset)
+    def stacks(self) -> dict[str, tuple[str, float]]:
+        """Scene of every target of focal stacks or light fields, and its plane [mm] or place."""
+        return stacks_of(self.study.dataset, self.study.targets.dataset, self.study.measure)
 
     @cached_property
     def probe(self) -> Any:
@@ -253,7 +253,7 @@ class _Ground:
         read = read_files.of(entry, study.folder, cls, (name for name, _ in targets))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
-            first = conditions[0].nominal if study.measure == "focus" else conditions[0]
+            first = conditions[0].nominal if self.stacks else conditions[0]
             own = preparation(study, entry.name, entry.params, first.nominal)
             for repeat in range(study.repeats):
                 cells = (
@@ -277,7 +277,7 @@ class _Ground:
                         params=entry.params,
                         target=target[0],
                         target_sha256=target[1],
-                        condition=display.name if study.measure == "focus" else display.title,  # planes share a row
+                        condition=display.name if self.stacks else display.title,  # planes and views share a row
                         repeat=repeat,
                         prepared=_ids(own, display.learned),
                         captures=entry.captures,
@@ -306,11 +306,11 @@ class _Ground:
         )
 
     def _planes(self, cls: type[Any], showing: Showing, display: Condition) -> list[list[Any]]:
-        """The targets of a phase for a whole stack, each with its distance from the plane of the display."""
-        if self.study.measure != "focus" or not traits_of(cls).planes:
+        """The targets of a phase for a whole scene, each with its distance from the plane of the display, or place."""
+        if not at_once(traits_of(cls), self.study.measure):
             return []
         changes = {sha256: dict([at.change] if at.change else []) for (_, sha256), at in showing}
-        return [[sha256, offset(display, change)] for sha256, change in changes.items()]
+        return [[sha256, where(display, change)] for sha256, change in changes.items()]
 
     def _holograms(self, display: Condition, target: Target, repeat: int) -> dict[str, Any]:
         """The method whose captures are predicted, and the description of its phase; empty for pictures."""
@@ -327,8 +327,8 @@ class _Ground:
         for group in (
             [(display,) for display in entry_displays] if self.study.predicts else _sharing(cls, entry_displays)
         ):
-            if measure == "focus":
-                yield from showings(cls, group, targets, self.planes)
+            if self.stacks:
+                yield from showings(cls, group, targets, self.stacks, measure)
             else:
                 yield from ([(target, display) for display in group] for target in targets)
 

@@ -10,7 +10,7 @@ realism", ACM Trans. Graph. 43(4), 68 (2024).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -27,16 +27,17 @@ from .random_frames import FromRandomFrames
 
 @dataclass(frozen=True)
 class LightField(FromRandomFrames):
-    """Adam on frames that start from random phases, for the squared error of the light field of a flat picture.
+    """Adam on frames that start from random phases, for the squared error of a light field.
 
-    The light field is what an eye sees whose pupil is in the middle of the iris, or on one of the rings around it:
-    every view is the picture, and all views have one brightness. SI units throughout.
+    The light field is what an eye sees whose pupil is at several places of the iris: given views of a scene with depth
+    (`solve_views`), or a flat picture, which every place sees, in the middle and on rings around it. All views have one
+    brightness. SI units throughout.
 
     Parameters
     ----------
     rings : int
-        Rings of places, evenly up to half of the iris' radius; the k-th has 6 k places. Between places that are far
-        apart no loss holds the picture.
+        Rings of places for a flat picture, evenly up to half of the iris' radius; the k-th has 6 k places. Between
+        places that are far apart no loss holds the picture.
     pupil : float
         Diameter of the eye's pupil, as a share of the iris'.
     """
@@ -46,12 +47,47 @@ class LightField(FromRandomFrames):
 
     title: ClassVar[str] = "frames of random phase for a light field, Choi 2022"
     fresnel: ClassVar[bool] = True
+    views: ClassVar[bool] = True
 
     def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
-        """The squared error of all views (Choi et al. 2022, the loss of light fields)."""
-        model, region = nominal_model(bench, channel, target), bench.spec.region
-        pupils = self._pupils(bench.spec).to(target.device, target.dtype)
-        wanted = target.repeat(1, len(pupils), 1)  # views one under another, so that one factor is for all of them
+        """The squared error of a flat picture at all places."""
+        places = [(0.0, 0.0)]
+        for ring in range(1, self.rings + 1):
+            angles = (math.tau * (place + 0.5) / (6 * ring) for place in range(6 * ring))
+            radius = ring / self.rings / 2
+            places += [(radius * math.sin(angle), radius * math.cos(angle)) for angle in angles]
+        return self._light_field_loss(target.expand(len(places), *target.shape), places, bench, channel)
+
+    def solve_views(self, targets: Tensor, places: Sequence[float], bench: Bench) -> Tensor:
+        """One hologram for several views.
+
+        Parameters
+        ----------
+        targets : Tensor
+            Linear intensities ``(V, C, h, w)`` in [0, 1].
+        places : sequence of float
+            Of the eye's pupil that sees them, sideways from the axis [radii of the iris].
+        bench : Bench
+            Nominal optics in SI units, and named random numbers.
+
+        Returns
+        -------
+        Tensor
+            Phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad].
+        """
+        solved = []
+        for channel, views in enumerate(targets.unbind(1)):
+            loss = self._light_field_loss(views[:, None], [(0.0, place) for place in places], bench, channel)
+            solved.append(self.descend(loss, views[:1], bench, channel))
+        return torch.stack(solved, dim=-3)[0]
+
+    def _light_field_loss(
+        self, views: Tensor, places: Sequence[tuple[float, float]], bench: Bench, channel: int
+    ) -> Callable[[Tensor], Tensor]:
+        """The squared error of views ``(V, B, h, w)`` (Choi et al. 2022, the loss of light fields)."""
+        model, region = nominal_model(bench, channel, views[0]), bench.spec.region
+        pupils = self._pupils(bench.spec, places).to(views.device, views.dtype)
+        wanted = torch.cat([*views], dim=-2)  # one under another, so that one factor is for all of them
 
         def loss(phase: Tensor) -> Tensor:
             spectrum = torch.fft.fft2(model.forward(unit_field(phase)).unflatten(0, (-1, self.frames)))
@@ -60,13 +96,10 @@ class LightField(FromRandomFrames):
 
         return loss
 
-    def _pupils(self, spec: DisplaySpec) -> Tensor:
+    def _pupils(self, spec: DisplaySpec, places: Sequence[tuple[float, float]]) -> Tensor:
         """Amplitude ``(V, H, W)`` of the eye's pupil at every place, over the frequencies of the image."""
         band = spec.pupil or 1.0
         fy, fx = frequencies(spec.shape, spec.pitch)
-        centres = [(0.0, 0.0)]
-        for ring in range(1, self.rings + 1):
-            radius = ring / self.rings * band / (4 * spec.pitch)  # up to half of the iris' [1/m]
-            angles = (math.tau * (place + 0.5) / (6 * ring) for place in range(6 * ring))
-            centres += [(radius * math.sin(angle), radius * math.cos(angle)) for angle in angles]
+        radius = band / (2 * spec.pitch)  # of the iris [1/m]
+        centres = [(down * radius, right * radius) for down, right in places]
         return torch.stack([iris(fy - y, fx - x, spec.pitch, self.pupil * band) for y, x in centres])

@@ -148,4 +148,5 @@ def test_wrong_parameters_are_one_line(name, params, message):
 def test_only_generated_images_are_for_training():
     training = {name: plugins.find("datasets", name).training for name in plugins.names("datasets")}
     assert training["dead_leaves"]
-    assert not any(training[name] for name in ("photographs", "crops", "charts", "folder", "focal_stacks"))
+    scored = ("photographs", "crops", "charts", "folder", "focal_stacks", "light_fields")
+    assert not any(training[name] for name in scored)

@@ -92,9 +92,10 @@ def test_a_study_of_a_method_that_needs_a_fresnel_plane_is_refused(method, tmp_p
     assert config(tmp_path, method, display="pluto-offaxis").labels
 
 
-def test_focal_stacks_are_refused(tmp_path):
-    with pytest.raises(UserError, match="focal stacks need a Fresnel plane"):
-        config(tmp_path, dataset="focal_stacks", measure="focus")
+@pytest.mark.parametrize(("dataset", "measure"), [("focal_stacks", "focus"), ("light_fields", "views")])
+def test_planes_and_views_of_scenes_are_refused(dataset, measure, tmp_path):
+    with pytest.raises(UserError, match=f"measure: {measure} needs a Fresnel plane"):
+        config(tmp_path, dataset=dataset, measure=measure)
 
 
 def test_optics_without_a_lens_are_described_as_before():

@@ -1,4 +1,4 @@
-"""Focus: one hologram of all planes of a scene against one hologram a plane, moved by a lens phase."""
+"""Focal stacks and light fields: one hologram of all planes or views of a scene against what knows of one."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .kind import Kind, subjects
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """One a display: the methods that make one hologram of all planes, or that the question names."""
+    """One a display: the methods that receive all planes or views, or that the question names."""
     layout, score = results.layout, results.headline
     chosen = dict.fromkeys([*(label for label in layout.methods if label in layout.stacked), *subjects(results)])
     for condition in results.conditions:
         parts = []
         for label in chosen:
             if test := tested(results, label, condition):
-                what = ", one hologram of all planes," if label in layout.stacked else ""
+                what = f", one hologram of {made_of(results, label)}," if label in layout.stacked else ""
                 shown = {"better": "", "worse": ""}.get(verdict(score, test), ", not shown")
                 parts.append(
                     f"{label}{what} {difference(score, test.estimate)} against {test.first}{shown}, "
@@ -30,18 +30,21 @@ def verdicts(results: Results) -> Iterator[str]:
             yield f"{condition}: {'; '.join(parts)}."
 
 
-def _planes(results: Results) -> int:
-    return len({plane for _, plane in results.layout.planes.values()})
+def made_of(results: Results, label: str) -> str:
+    """What a hologram of a method is made of."""
+    part = {"focus": ("all planes", "one plane"), "views": ("all views", "the middle view")}[results.layout.measure]
+    return part[0] if label in results.layout.stacked else part[1]
 
 
-def _seconds(results: Results, label: str, condition: str) -> float:
+def seconds(results: Results, label: str, condition: str) -> float:
     """Computing time of a scene [s]."""
-    times = 1 if label in results.layout.stacked else _planes(results)
-    return times * float(results.row(label, condition)["solving_s"])
+    once = label in results.layout.stacked or results.layout.measure == "views"
+    holograms = 1 if once else len({plane for _, plane in results.layout.planes.values()})
+    return holograms * float(results.row(label, condition)["solving_s"])
 
 
 def _times(results: Results, label: str, condition: str) -> str:
-    own, other = (_seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
+    own, other = (seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
     return f"{own / other:.2g} times its seconds a scene"
 
 
@@ -51,17 +54,17 @@ def _against(results: Results, label: str, condition: str) -> str:
 
 
 def rows(board: Board) -> Markdown | None:
-    """A row a method and display: score over all planes, difference to the baseline, seconds a scene."""
+    """A row a method and display: score over all planes or views, difference to the baseline, seconds a scene."""
     results = board.results
     score, baseline = results.headline, results.layout.baseline
     lines = [
         [
             marked(results, label, condition),
             condition,
-            "all planes" if label in results.layout.stacked else "one plane",
+            made_of(results, label),
             score.in_row(results.row(label, condition)),
             *([_against(results, label, condition)] if baseline else []),
-            number(_seconds(results, label, condition)),
+            number(seconds(results, label, condition)),
         ]
         for condition in results.conditions
         for label in results.methods(condition)
@@ -72,11 +75,12 @@ def rows(board: Board) -> Markdown | None:
 
 
 KIND = Kind(
-    question="What does one hologram of all planes gain over one hologram a plane, and what does it cost?",
+    question="What does a hologram of all planes or views of a scene gain over that of one, and what does it cost?",
     applies=lambda results: bool(results.layout.planes),
     verdicts=verdicts,
     table=rows,
     limits=(
-        "Scenes: the planes of a scene are not independent, so intervals and tests are over scenes, which are few.",
+        "Scenes: the planes or views of a scene are not independent, so intervals and tests are over scenes, which are "
+        "few.",
     ),
 )

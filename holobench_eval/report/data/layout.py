@@ -19,8 +19,8 @@ from ...study import isolation
 from ...study.config import load_study
 from ...study.definition import PREDICTIONS, Claim, Study
 from ...study.displays import Condition, changed, displays
-from ...study.focal_stacks import planes_of
 from ...study.plan import is_reference
+from ...study.stacks import at_once, stacks_of
 from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, Text, plain
 
@@ -91,9 +91,9 @@ class Layout:
     label.
     note: a paragraph that the study wants among its limits. measure: that of the study, or ``files`` (pictures that
     were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
-    holograms: whose captures are predicted, with parameters. planes: scene and plane [mm] of every target of focal
-    stacks; stacked: labels of methods that make one hologram of all planes of a scene. learned_display: the condition
-    that is a trained network (None: benches).
+    holograms: whose captures are predicted, with parameters. planes: scene of every target of focal stacks or light
+    fields, and its plane [mm] or the place of the eye's pupil; stacked: labels of methods that receive all planes or
+    views of a scene. learned_display: the condition that is a trained network (None: benches).
     trained: labels of methods that are trained before they solve; blind: of those among them whose training takes no
     photograph; training: on what (None: nothing is trained);
     identities: labels of those whose network is the ideal image itself, which has nothing to learn.
@@ -198,10 +198,11 @@ class Layout:
         return {condition: sweep.change(value) for sweep in self.sweeps for value, condition in sweep.points}
 
     def change(self, condition: str, target: str = "") -> Change:
-        """What was changed under a condition; the plane of a target of a focal stack is a change of its display."""
+        """What was changed under a condition; the plane or place of a target is a change of its display."""
         if condition in self.changed or is_reference(condition) or target not in self.planes:
             return self.changed.get(condition, Change())
-        return Change("plane", self.planes[target][1], "mm")
+        kind, unit = ("plane", "mm") if self.measure == "focus" else ("place", "iris radii")
+        return Change(kind, self.planes[target][1], unit)
 
     @property
     def reported_metrics(self) -> tuple[str, ...]:
@@ -263,10 +264,10 @@ def layout_of(study: Study) -> Layout:
         training=_training_set(study) if trained or study.display.learned else None,
         camera=frozenset(label for label, method in traits.items() if method.camera),
         sweeps=tuple(_sweeps(study, conditions)),
-        planes=planes_of(study.dataset, study.targets.dataset) if study.measure == "focus" else {},
+        planes=stacks_of(study.dataset, study.targets.dataset, study.measure),
         real=study.display.real,
         clusters=clusters_of(study.dataset),
-        stacked=frozenset(label for label, method in traits.items() if method.planes and study.measure == "focus"),
+        stacked=frozenset(label for label, method in traits.items() if at_once(method, study.measure)),
         study=study.name,
         params={entry.label: entry.params for entry in study.methods},
         capture_limits={entry.label: entry.captures for entry in study.methods if entry.captures is not None},

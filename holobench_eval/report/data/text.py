@@ -149,6 +149,18 @@ FOCUS = Text(
 )
 
 
+VIEWS = Text(
+    procedure=(
+        "The targets are light fields: what an eye sees of a scene with depth whose pupil is at one place of the "
+        "eyebox after another. A method makes one hologram of a scene: from all views, or, if it knows of none, from "
+        "the view nearest to the axis. The display shows it to a pupil at each place; the capture is matched in "
+        "intensity and scored against the view from there."
+    ),
+    caution="Views of one scene are not independent: intervals and tests are over scenes.",
+    picture="Each capture is what the eye sees from the place of its target, matched in intensity and sRGB-encoded",
+)
+
+
 COMPARED = {
     "stored": "in the values as stored",
     "srgb": "in linear light, for which captures and targets were decoded from sRGB",
@@ -174,4 +186,11 @@ REAL = (
     "The display is a real bench. Listed are its nominal optics, which methods know; its deviations from them are "
     "unknown."
 )
-BY_MEASURE = {"picture": Text(), "prediction": PREDICTION, "error_budget": PREDICTION, "focus": FOCUS, FILES: GIVEN}
+BY_MEASURE = {
+    "picture": Text(),
+    "prediction": PREDICTION,
+    "error_budget": PREDICTION,
+    "focus": FOCUS,
+    "views": VIEWS,
+    FILES: GIVEN,
+}

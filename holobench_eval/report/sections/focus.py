@@ -1,9 +1,10 @@
-"""Focal stacks, plane by plane."""
+"""Focal stacks plane by plane, and light fields place by place."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..answers.focus import made_of, seconds
 from ..data.phrases import marked
 from ..data.results import Results
 from ..data.statistics import Array, Estimate, mean_interval
@@ -13,39 +14,50 @@ from ..section import Blocks, Figures, Report, Section
 
 
 def _render(report: Report, _: Figures) -> Blocks:
-    yield heading("Plane by plane")
-    yield (
-        f"{report.results.headline.axis}, mean over scenes. Planes are given in mm from the image distance of the "
-        "full panel, positive away from the panel, and scale with the panel. A scene takes one hologram per plane, or "
-        "one of all planes."
-    )
+    title, explanation = WORDS[report.layout.measure]
+    yield heading(title)
+    yield f"{report.results.headline.axis}, mean over scenes. {explanation}"
     for condition in report.results.conditions:
         yield heading(condition, 3)
         yield by_plane(report.results, condition)
 
 
+WORDS = {
+    "focus": (
+        "Plane by plane",
+        "Planes are given in mm from the image distance of the full panel, positive away from the panel, and scale "
+        "with the panel. A scene takes one hologram per plane, or one of all planes.",
+    ),
+    "views": (
+        "Place by place of the eye's pupil",
+        "Places are given in radii of the iris, sideways from the axis. A scene takes one hologram.",
+    ),
+}
+
+
 def planes(results: Results) -> list[float]:
-    """The planes [mm], nearest to the panel first."""
+    """The planes [mm], nearest to the panel first, or the places of the eye's pupil from left to right."""
     return sorted({plane for _, plane in results.layout.planes.values()})
 
 
 def by_plane(results: Results, condition: str) -> Markdown:
     """Mean over scenes at every plane, and seconds."""
     score, distances = results.headline, planes(results)
-    columns = ["method", "hologram of", *(f"{plane:g} mm" for plane in distances), "all planes"]
+    focus = results.layout.measure == "focus"
+    each = [f"{plane:g} mm" if focus else f"{plane:g}" for plane in distances]
+    columns = ["method", "hologram of", *each, "all planes" if focus else "all places"]
     rows = []
     for name in results.methods(condition):
-        values, stacked = results.values(name, condition), name in results.layout.stacked
+        values = results.values(name, condition)
         estimates = [_at(results, values, plane) for plane in distances]
-        seconds = float(results.row(name, condition)["solving_s"])
         rows.append(
             [
                 marked(results, name, condition),
-                "all planes" if stacked else "one plane",
+                made_of(results, name),
                 *map(score.estimate, estimates),
                 score.number(float(np.mean(values))),
-                number(seconds),
-                number(seconds * (1 if stacked else len(distances))),
+                number(float(results.row(name, condition)["solving_s"])),
+                number(seconds(results, name, condition)),
             ]
         )
     return table([*columns, "seconds a hologram", "seconds a scene"], rows)

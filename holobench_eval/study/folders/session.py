@@ -23,7 +23,7 @@ from ...lab.session.geometry import look
 from ...lab.session.manifest import dark_name, refuse_links_out
 from .. import isolation
 from ..config import load_study
-from ..definition import Study
+from ..definition import STACKS, Study
 from ..displays import condition, displays
 from ..executors import Serial
 from ..opening import forget_sessions, open_display
@@ -237,8 +237,9 @@ def _reaches_out(path: Path) -> str:
 
 def _on_one_display(study: Study, bench: Path | None, display: str | None) -> Study:
     """The study with a single display, for an exchange of photographs. UserError where that is impossible."""
-    if study.measure == "focus" or study.sweeps or study.display.learned:
-        what = "focal stacks" if study.measure == "focus" else "changes of a display" if study.sweeps else "a network"
+    if study.measure in STACKS or study.sweeps or study.display.learned:
+        stacks = "focal stacks" if study.measure == "focus" else "light fields"
+        what = stacks if study.measure in STACKS else "changes of a display" if study.sweeps else "a network"
         raise UserError(f"{study.file}: a session measures pictures on one real display, not {what}")
     if bench is not None:
         grid = replace(study.display, bench=str(bench.resolve()), profiles=(), panel=None)

@@ -19,8 +19,8 @@ from ...metrics import control, match, score
 from ...metrics.psnr import psnr
 from ...metrics.ssim import RADIUS, LocalStatistics
 from .. import identity
-from ..focal_stacks import INFOCUS, SCORES
 from ..plan import Cell
+from ..stacks import INFOCUS, SCORES
 from ..store import Store
 from .job import Job
 

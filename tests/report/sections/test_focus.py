@@ -47,6 +47,14 @@ def test_a_table_has_a_column_a_plane_and_the_seconds_of_a_hologram_and_of_a_sce
     assert joint[6:] == ["5", "5"]
 
 
+def test_views_have_a_column_a_place_and_one_hologram_a_scene() -> None:
+    results = results_of({"lens": 20.0, "joint": 19.0}, noise=0.0, measure="views")
+    header, _, lens, joint = lines(by_plane(results, "bench"))
+    assert header[2:] == ["-2", "0", "2", "all places", "seconds a hologram", "seconds a scene"]
+    assert [lens[1], *lens[6:]] == ["the middle view", "2", "2"]
+    assert [joint[1], *joint[6:]] == ["all views", "5", "5"]
+
+
 def test_other_studies_have_no_such_section() -> None:
     (section,) = SECTIONS
     for planes in (PLANES, {}):

@@ -1,0 +1,93 @@
+"""Focal stacks and light fields in a plan: at which plane, or through which pupil, each target is seen, and which cells
+share a hologram (paper 7.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..core.errors import UserError
+from ..display import load_profile
+from ..display.traits import Traits, traits_of
+from .displays import Condition
+
+SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")  # of the part of a picture that is in focus
+INFOCUS, VERSION = "infocus", "1"  # the name of these scores, and what is raised whenever a value would change
+LENS, STAYS = "refocus", "other_plane"  # the display adds a lens for the plane, or leaves the hologram unchanged
+EYE = "eye_pupil"  # the picture is what an eye sees from a place
+NEEDS = {"focus": ("plane", ("plane", "mask"), "focal_stacks"), "views": ("view", ("place",), "light_fields")}
+"""By measure: what a target is, which functions of a dataset tell of it, and a dataset that has them."""
+
+Target = tuple[str, str]  # name and digest
+Showing = list[tuple[Target, Condition]]  # targets, each with the display that it is shown on
+Stacks = Mapping[str, tuple[str, float]]  # scene of every target, and its plane or place
+
+
+def stacks_of(dataset: Any, name: str, measure: str) -> dict[str, tuple[str, float]]:
+    """Scene of every target, and its plane [mm on the full panel] or the place of the eye's pupil [radii of the iris];
+    nothing for other measures. UserError for a dataset without."""
+    if measure not in NEEDS:
+        return {}
+    part, functions, such = NEEDS[measure]
+    if not all(callable(getattr(dataset, function, None)) for function in ("scene", *functions)):
+        raise UserError(f"dataset '{name}' has no {part}s; measure: {measure} needs one that has, such as {such}")
+    where = getattr(dataset, functions[0])
+    return {item: (dataset.scene(item), float(where(item))) for item in dataset.items()}
+
+
+def targets_a_scene(stacks: Stacks) -> int:
+    """Planes or views of each scene: a wrong target has to come from another scene, this many targets on."""
+    return len(stacks) // len({scene for scene, _ in stacks.values()})
+
+
+def at_once(method: Traits, measure: str) -> bool:
+    """Whether a method receives all planes or views of a scene."""
+    return {"focus": method.planes, "views": method.views}.get(measure, False)
+
+
+def showings(
+    method: type[Any], group: Sequence[Condition], targets: Sequence[Target], stacks: Stacks, measure: str
+) -> Iterator[Showing]:
+    """The targets and displays of each solution of a method.
+
+    Planes: a method with ``planes = True`` computes a hologram for all planes of a scene, for displays with equal plane
+    spacing. Other methods compute a hologram for each target, and the display moves it to the target's plane. Views: a
+    hologram a scene, which other methods than those with ``views = True`` compute for the view nearest to the axis,
+    the first.
+    """
+    scenes = dict.fromkeys(stacks[name][0] for name, _ in targets)
+    by_scene = [[target for target in targets if stacks[target[0]][0] == scene] for scene in scenes]
+    if measure == "views":
+        for views in by_scene:
+            views.sort(key=lambda target: abs(stacks[target[0]][1]))
+            yield [
+                (target, replace(display, change=(EYE, f"{stacks[target[0]][1]:g}")))
+                for target in views
+                for display in group
+            ]
+    elif not traits_of(method).planes:
+        for target in targets:
+            yield [(target, _at(display, LENS, stacks[target[0]][1])) for display in group]
+    else:
+        alike: dict[float, list[Condition]] = {}
+        for display in group:
+            alike.setdefault(offset(display, {STAYS: 1.0}), []).append(display)
+        for planes in by_scene:
+            for subgroup in alike.values():
+                yield [(target, _at(display, STAYS, stacks[target[0]][1])) for target in planes for display in subgroup]
+
+
+def _at(display: Condition, kind: str, millimetres: float) -> Condition:
+    return display if millimetres == 0 else replace(display, change=(kind, millimetres))
+
+
+def where(display: Condition, change: Mapping[str, Any]) -> float:
+    """The place of a cell's pupil [radii of the iris], or see ``offset``."""
+    return float(change[EYE]) if EYE in change else offset(display, change)
+
+
+def offset(display: Condition, change: Mapping[str, Any]) -> float:
+    """Distance of a cell's plane from the plane of its display [m], scaled to the display's panel."""
+    full = load_profile(display.source, folder=display.folder).panel.distance
+    return float(sum(change.values())) * 1e-3 * display.spec.distance / full
