@@ -13,21 +13,19 @@ from .kind import Kind, subjects
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """One a display: the methods that receive all planes or views, or that the question names."""
+    """One a display: the methods that receive all planes or views, or that the question names, best first."""
     layout, score = results.layout, results.headline
     chosen = dict.fromkeys([*(label for label in layout.methods if label in layout.stacked), *subjects(results)])
     for condition in results.conditions:
-        parts = []
-        for label in chosen:
-            if test := tested(results, label, condition):
-                what = f", one hologram of {made_of(results, label)}," if label in layout.stacked else ""
-                shown = {"better": "", "worse": ""}.get(verdict(score, test), ", not shown")
-                parts.append(
-                    f"{label}{what} {difference(score, test.estimate)} against {test.first}{shown}, "
-                    f"{_times(results, label, condition)}"
-                )
+        found = [(label, test) for label in chosen if (test := tested(results, label, condition))]
+        found.sort(key=lambda each: each[1].estimate.mean, reverse=score.higher_is_better)
+        parts = [
+            f"{label} (of {made_of(results, label)}) {difference(score, test.estimate)}"
+            + ("" if verdict(score, test) in ("better", "worse") else ", not shown")
+            for label, test in found
+        ]
         if parts:
-            yield f"{condition}: {'; '.join(parts)}."
+            yield f"{condition}, against {layout.baseline}: {'; '.join(parts)}."
 
 
 def made_of(results: Results, label: str) -> str:
@@ -41,11 +39,6 @@ def seconds(results: Results, label: str, condition: str) -> float:
     once = label in results.layout.stacked or results.layout.measure == "views"
     holograms = 1 if once else len({plane for _, plane in results.layout.planes.values()})
     return holograms * float(results.row(label, condition)["solving_s"])
-
-
-def _times(results: Results, label: str, condition: str) -> str:
-    own, other = (seconds(results, name, condition) for name in (label, str(results.layout.baseline)))
-    return f"{own / other:.2g} times its seconds a scene"
 
 
 def _against(results: Results, label: str, condition: str) -> str:
