@@ -28,15 +28,18 @@ class LightFields:
     """Ray-traced scenes with depth, each seen from several places of the eye's pupil: what is near moves, and hides
     other things, as the pupil moves sideways.
 
-    The eye focuses on the image distance of the panel. scenes: ``shapes`` and ``shapes-2``, ``shapes-3`` ... places: of
-    the pupil, sideways from the axis in radii of the iris, positive to the right. near, far: where the two ends of a
+    The eye focuses on the image distance of the panel. scenes: ``shapes`` and ``shapes-2``, ``shapes-3`` ... places:
+    where the pupil is when a hologram is scored, sideways from the axis in radii of the iris, positive to the right;
+    given: where it is in the views that methods are given, by default such that each scored place lies halfway between
+    two of these, where nothing holds a picture. near, far: where the two ends of a
     scene's depth lie, in mm from the image distance of the full panel; positive is nearer to the viewer. blur: as in
     ``focal_stacks``, of the whole iris, of which the pupil has half the diameter. While the pupil moves by a radius of
-    the iris, a thing 1 mm away moves by half of ``blur``.
+    the iris, a thing 1 mm away moves by half of ``blur``, that of green light for all colours.
     """
 
     scenes: Annotated[tuple[str, ...], MinLen(1)] = (GENERATED,)
-    places: Annotated[tuple[Place, ...], MinLen(1)] = (-0.5, -0.25, 0.0, 0.25, 0.5)
+    places: Annotated[tuple[Place, ...], MinLen(1)] = (-0.4375, -0.1875, -0.0625, 0.0625, 0.1875, 0.4375)
+    given: Annotated[tuple[Place, ...], MinLen(1)] = (-0.5, -0.375, -0.25, -0.125, 0.0, 0.125, 0.25, 0.375, 0.5)
     near: Plane = 10.0
     far: Plane = -10.0
     blur: Annotated[float, Interval(gt=0, le=1)] = BLUR
@@ -47,14 +50,19 @@ class LightFields:
         """UserError for a repeated scene or place, one that is not drawn, and for a depth without extent."""
         refuse_repeats("scene", self.scenes, "scenes")
         refuse_repeats("place", self.places, "places")
+        refuse_repeats("place", self.given, "given")
         if other := [scene for scene in self.scenes if not generated(scene)]:
             raise UserError(f"scene '{other[0]}' has one view; allowed: {GENERATED}, {GENERATED}-2, {GENERATED}-3 ...")
         if self.near <= self.far:
             raise UserError(f"near is to be larger than far, got {self.near:g} and {self.far:g} mm")
 
     def items(self) -> list[str]:
-        """``scene from place``, scene by scene."""
-        return list(self._parts())
+        """``scene from place``, scene by scene, of the scored places."""
+        return [_name(scene, place) for scene, place in itertools.product(self.scenes, self.places)]
+
+    def views(self, item: str) -> list[str]:
+        """The views of an item's scene that methods are given, by names as ``items`` has them."""
+        return [_name(self.scene(item), place) for place in self.given]
 
     def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
         """The view from a place, ``(channels, *shape)`` linear light in [0, 1]."""
@@ -77,12 +85,15 @@ class LightFields:
         return self._part(item)[1]
 
     def _parts(self) -> dict[str, tuple[str, float]]:
-        """Scene and place of every item."""
-        pairs = itertools.product(self.scenes, self.places)
-        return {f"{scene} from {place:g}": (scene, place) for scene, place in pairs}
+        """Scene and place of every view."""
+        return {_name(*pair): pair for pair in itertools.product(self.scenes, (*self.places, *self.given))}
 
     def _part(self, item: str) -> tuple[str, float]:
         return self._parts()[known("view", item, list(self._parts()))]
+
+
+def _name(scene: str, place: float) -> str:
+    return f"{scene} from {place:g}"
 
 
 @lru_cache(maxsize=64)

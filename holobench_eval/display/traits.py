@@ -52,6 +52,9 @@ FLAGS = tuple(item.name for item in fields(Traits) if item.name not in ("timed",
 """What any method may declare; only one that ships may say that it is not timed, or simulates a bench."""
 BOOLEANS = tuple(item.name for item in fields(Traits) if isinstance(item.default, bool) and item.name in FLAGS)
 
+SCENES = {"planes": "solve_planes", "views": "solve_views"}
+"""Flags that promise a function."""
+
 LINE = "text in one line"
 WANTED = {"form": "a set of text", "title": LINE, "tuned": LINE, "version": "a whole number from 0 up"}
 
@@ -77,6 +80,10 @@ def traits_of(method: object, name: str = "") -> Traits:
             cls, wanted = method if isinstance(method, type) else type(method), WANTED.get(flag, "True or False")
             raise UserError(f"method '{name or cls.__name__}': {flag} should be {wanted}")
     has = frozenset(function for function in FUNCTIONS if callable(getattr(method, function, None)))
+    for flag, function in SCENES.items():
+        if declared[flag] and function not in has:
+            cls = method if isinstance(method, type) else type(method)
+            raise UserError(f"method '{name or cls.__name__}': {flag} is True, which needs a function {function}")
     return Traits(**declared | {"functions": has})
 
 

@@ -18,7 +18,7 @@ from . import identity, isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
 from .isolation import read_files
-from .stacks import Showing, Target, at_once, showings, stacks_of, targets_a_scene, where
+from .stacks import Showing, Target, at_once, given_views, offset, showings, stacks_of, targets_a_scene
 from .versions import HARNESS, dataset_version, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells, see ``reference_of``
@@ -250,7 +250,8 @@ class _Ground:
     def solutions(self, entry: MethodEntry, entry_displays: list[Condition], targets: list[Target]) -> Iterator[Task]:
         """A task for every solution of a method: target by target, repeat by repeat."""
         study, cls = self.study, isolation.find(entry.name, self.study.folder)
-        read = read_files.of(entry, study.folder, cls, (name for name, _ in targets))
+        solved = {target: self._solved(target) for target in targets}
+        read = read_files.of(entry, study.folder, cls, dict.fromkeys(name for name, _ in solved.values()))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
             first = conditions[0].nominal if self.stacks else conditions[0]
@@ -261,11 +262,11 @@ class _Ground:
                         self._phase(
                             cls,
                             entry.params,
-                            showing[0][0],
+                            solved[showing[0][0]],
                             first,
                             repeat,
                             learned=own.id if own else "",
-                            files=read[target[0]],
+                            files=read[solved[target][0]],
                             planes=self._planes(cls, showing, first),
                             captures=entry.captures,
                             predicts=self._holograms(first, target, repeat).get("phase"),
@@ -283,7 +284,7 @@ class _Ground:
                         captures=entry.captures,
                         exposure=entry.exposure or study.display.exposure,
                         holograms=self._holograms(display, target, repeat),
-                        files=read[target[0]],
+                        files=read[solved[target][0]],
                     )
                     for target, display in showing
                 )
@@ -309,8 +310,17 @@ class _Ground:
         """The targets of a phase for a whole scene, each with its distance from the plane of the display, or place."""
         if not at_once(traits_of(cls), self.study.measure):
             return []
+        if self.study.measure == "views":
+            return [[sha256, place] for _, sha256, place in given_views(self.study.dataset, showing[0][0][0])]
         changes = {sha256: dict([at.change] if at.change else []) for (_, sha256), at in showing}
-        return [[sha256, where(display, change)] for sha256, change in changes.items()]
+        return [[sha256, offset(display, change)] for sha256, change in changes.items()]
+
+    def _solved(self, target: Target) -> Target:
+        """The picture that a phase is named by: a target itself, or the first view of its scene that methods get."""
+        if self.study.measure != "views":
+            return target
+        name, sha256, _ = given_views(self.study.dataset, target[0])[0]
+        return name, sha256
 
     def _holograms(self, display: Condition, target: Target, repeat: int) -> dict[str, Any]:
         """The method whose captures are predicted, and the description of its phase; empty for pictures."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.errors import UserError
 from ..display import load_profile
+from ..display.simulated.changes.kinds import PLACES
 from ..display.traits import Traits, traits_of
 from .displays import Condition
 
@@ -16,24 +17,37 @@ SCORES = ("psnr_linear_infocus", "ssim_linear_infocus")  # of the part of a pict
 INFOCUS, VERSION = "infocus", "1"  # the name of these scores, and what is raised whenever a value would change
 LENS, STAYS = "refocus", "other_plane"  # the display adds a lens for the plane, or leaves the hologram unchanged
 EYE = "eye_pupil"  # the picture is what an eye sees from a place
-NEEDS = {"focus": ("plane", ("plane", "mask"), "focal_stacks"), "views": ("view", ("place",), "light_fields")}
+NEEDS = {"focus": ("plane", ("plane", "mask"), "focal_stacks"), "views": ("view", ("place", "views"), "light_fields")}
 """By measure: what a target is, which functions of a dataset tell of it, and a dataset that has them."""
 
 Target = tuple[str, str]  # name and digest
 Showing = list[tuple[Target, Condition]]  # targets, each with the display that it is shown on
 Stacks = Mapping[str, tuple[str, float]]  # scene of every target, and its plane or place
+View = tuple[str, str, float]  # name, digest, and place of the eye's pupil
 
 
 def stacks_of(dataset: Any, name: str, measure: str) -> dict[str, tuple[str, float]]:
     """Scene of every target, and its plane [mm on the full panel] or the place of the eye's pupil [radii of the iris];
-    nothing for other measures. UserError for a dataset without."""
+    nothing for other measures. UserError for a dataset without, and for places that are none."""
     if measure not in NEEDS:
         return {}
     part, functions, such = NEEDS[measure]
     if not all(callable(getattr(dataset, function, None)) for function in ("scene", *functions)):
         raise UserError(f"dataset '{name}' has no {part}s; measure: {measure} needs one that has, such as {such}")
     where = getattr(dataset, functions[0])
-    return {item: (dataset.scene(item), float(where(item))) for item in dataset.items()}
+    found = {item: (dataset.scene(item), float(where(item))) for item in dataset.items()}
+    if measure == "views":
+        for item in found:
+            for view in (item, *dataset.views(item)):
+                if not abs(dataset.place(view)) <= 1:
+                    raise UserError(f"dataset '{name}': '{view}' is from {dataset.place(view)}; expected {PLACES}")
+    return found
+
+
+def given_views(dataset: Any, item: str) -> list[View]:
+    """The views of an item's scene that methods are given, that nearest to the axis first."""
+    views = [(view, str(dataset.digest(view)), float(dataset.place(view))) for view in dataset.views(item)]
+    return sorted(views, key=lambda view: abs(view[2]))
 
 
 def targets_a_scene(stacks: Stacks) -> int:
@@ -53,19 +67,15 @@ def showings(
 
     Planes: a method with ``planes = True`` computes a hologram for all planes of a scene, for displays with equal plane
     spacing. Other methods compute a hologram for each target, and the display moves it to the target's plane. Views: a
-    hologram a scene, which other methods than those with ``views = True`` compute for the view nearest to the axis,
-    the first.
+    hologram a scene, which is made of `given_views`, or of the first of them by a method without ``views = True``.
     """
     scenes = dict.fromkeys(stacks[name][0] for name, _ in targets)
     by_scene = [[target for target in targets if stacks[target[0]][0] == scene] for scene in scenes]
     if measure == "views":
         for views in by_scene:
-            views.sort(key=lambda target: abs(stacks[target[0]][1]))
-            yield [
-                (target, replace(display, change=(EYE, f"{stacks[target[0]][1]:g}")))
-                for target in views
-                for display in group
-            ]
+            places = [f"{stacks[name][1]:g}" for name, _ in views]
+            seen = zip(views, places, strict=True)
+            yield [(view, replace(display, change=(EYE, place))) for view, place in seen for display in group]
     elif not traits_of(method).planes:
         for target in targets:
             yield [(target, _at(display, LENS, stacks[target[0]][1])) for display in group]
@@ -80,11 +90,6 @@ def showings(
 
 def _at(display: Condition, kind: str, millimetres: float) -> Condition:
     return display if millimetres == 0 else replace(display, change=(kind, millimetres))
-
-
-def where(display: Condition, change: Mapping[str, Any]) -> float:
-    """The place of a cell's pupil [radii of the iris], or see ``offset``."""
-    return float(change[EYE]) if EYE in change else offset(display, change)
 
 
 def offset(display: Condition, change: Mapping[str, Any]) -> float:

@@ -16,7 +16,10 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
+from ...core.errors import UserError
+from ...display.api import DisplaySpec
 from ...optics.phase import TAU
+from ..coarse.levels import Levels
 from ..common import Bench, ByColour, nominal_model, unit_field
 from ..descent import adam, by_autograd
 from ..losses import intensity_l2
@@ -24,7 +27,8 @@ from ..losses import intensity_l2
 
 @dataclass(frozen=True)
 class FromRandomFrames(ByColour):
-    """Adam on frames that start from random phases of their own; a subclass gives the loss. SI units throughout.
+    """Adam on frames that start from random phases of their own; a subclass gives the loss. Where the maker's table
+    says which phases the levels of a panel have, each pixel gets the nearest in the end. SI units throughout.
 
     Parameters
     ----------
@@ -40,6 +44,13 @@ class FromRandomFrames(ByColour):
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 200
     step: Annotated[float, Interval(gt=0, le=10)] = 0.1
 
+    version: ClassVar[int] = 2
+
+    def refuse_display(self, spec: DisplaySpec) -> None:
+        """UserError for a display that shows fewer frames in an exposure."""
+        if self.frames > spec.frames:
+            raise UserError(f"frames: {self.frames}; '{spec.name}' shows {spec.frames} at most in an exposure")
+
     @abstractmethod
     def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
         """The loss ``(B F,)`` of phases ``(B F, H, W)`` [rad] for a target ``(B, h, w)``."""
@@ -54,6 +65,9 @@ class FromRandomFrames(ByColour):
         start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
         start = start.to(target.device, target.dtype).repeat(len(target), 1, 1)  # the same for all of a batch
         frames = adam(start, by_autograd(loss), self.iterations, self.step)
+        if bench.spec.levels:
+            levels = Levels(bench.spec, channel, frames)
+            frames = levels.shown_by(levels.nearest(frames))
         return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
 
 

@@ -24,7 +24,7 @@ MEASURES: Mapping[str, tuple[Measure, Measure]] = {  # of solutions and of floor
     "prediction": (prediction.prediction, prediction.floor),
     "error_budget": (error_budget.error_budget, prediction.floor),
     "focus": (focus.focus, picture.floor),
-    "views": (focus.focus, picture.floor),
+    "views": (focus.views, picture.floor),
 }
 
 QUICK = 0.1  # s of a solution; to wait for the disk, so that a record outlives a loss of power, takes some milliseconds
