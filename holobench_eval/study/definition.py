@@ -171,9 +171,9 @@ class MethodEntry:
 class Protocol:
     """How captures are scored.
 
-    version: of the metric protocol; metrics: names of the metrics to compute (None: all; they take 10 s for a capture
-    of 1080 x 1920 pixels), and for predictions ``control``, which takes four more captures of each target and is
-    computed only where it is named; lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
+    version: of the metric protocol; metrics: names of the metrics to compute (None: all, 10 s for a capture of
+    1080 x 1920 pixels), and for predictions ``control``, which takes four more captures of each target and is computed
+    only where it is named; lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
     """
 
     version: Literal["v2"] = "v2"
@@ -225,20 +225,18 @@ class Study:
 
     title: heads the report; display: what shows the holograms; targets: the images that are scored; methods: what is
     compared, each a name or a mapping, in the order of the tables.
-    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of the
-    captures of the holograms' method against those captures; ``error_budget`` also splits the error of these captures
-    by what the methods, in the order of the config, explain of it; ``focus`` scores the planes of focal stacks, each at
-    its own distance, and ``views`` light fields, each view from its place. holograms: for predictions, the method whose
-    holograms are captured; training: the images that methods may train on, the same for all; sweeps: changes of the
-    displays at test time. question: what the study asks, which its report answers first, for the methods whose labels
-    the question names; would_change: which result would change the answer; note: a paragraph that the report prints
-    among the limits of its answer.
-    seed: of all random numbers, so that the same config gives the same numbers; repeats: how often every cell is
-    measured, with new noise; timing: ``shared`` takes a solution's seconds beside whatever other workers do, ``alone``
-    measures one solution a row of the tables with nothing beside it; protocol: how captures are scored; baseline: label
-    that paired tests compare against (empty: that of the first method); second_baseline: label of another one, such as
-    the strongest open-loop row, that differences are also given to (empty: none); headline: the column that the report
-    leads with, a metric and a domain; save: what else is written beside the scores.
+    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of captures
+    of the holograms' method; ``error_budget`` also splits the error of these captures by what the methods, in the order
+    of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own distance, and ``views``
+    light fields, each view from its place. holograms: for predictions, the method whose holograms are captured;
+    training: the images that methods may train on, the same for all; sweeps: changes of the displays at test time.
+    question: what the report answers first, for the methods whose labels it names; would_change: which result would
+    change the answer; note: a paragraph that the report prints among the limits of its answer.
+    seed: of all random numbers; repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a
+    solution's seconds beside other workers, ``alone`` those of one solution a row with nothing beside it; protocol: how
+    captures are scored; baseline: label that paired tests compare against (empty: that of the first method);
+    second_baseline: label of another one that differences are also given to (empty: none); headline: the column that
+    the report leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same

@@ -20,8 +20,7 @@ from ..stage import Stage
 class AddedLens(Stage):
     """A quadratic phase that moves the image from the distance z to z (1 + ``move``).
 
-    move: along rows, along columns and cross term, since a cylinder moves the foci of vertical and horizontal lines
-    differently [relative to the distance]. The image is stretched by 1 + move.
+    move: along rows, along columns and cross term [relative to the distance]. The image is stretched by 1 + move.
     """
 
     title: ClassVar[str] = "added lens"
@@ -50,10 +49,9 @@ class AddedLens(Stage):
 class Eye(Stage):
     """A relaxed eye that sees the plane at z (1 + ``focus``) instead of the image's, through its pupil.
 
-    focus: along rows, along columns and cross term; astigmatism gives each meridian a distance of its own [relative to
-    the distance]. See ``changes.vision``. pupil: diameter in the plane of the iris, as that of the iris
-    [share of the panel's band], none for one that takes in all light; decentre: of the pupil, rows and columns [share
-    of half the band]. known: whether methods know the focus, as they know the nominal optics.
+    focus: along rows, along columns and cross term [relative to the distance]; pupil: diameter in the plane of the
+    iris, as that of the iris [share of the panel's band], none for one that takes in all light; decentre: of the pupil,
+    rows and columns [share of half the band]; known: whether methods know the focus, as they know the nominal optics.
     """
 
     title: ClassVar[str] = "eye"

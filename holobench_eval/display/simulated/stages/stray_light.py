@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class StrayLight(Stage):
     """A share of the light arrives spread by a Gaussian, and adds in intensity; its total stays.
 
-    share: that is spread [share of the light]; reach: standard deviation of the Gaussian [panel heights]. A fine
-    checkerboard keeps a contrast of ``(1 - share / 2) / (share / 2)``. What is scattered beyond the image is lost.
+    share: that is spread [share of the light]; reach: standard deviation of the Gaussian [panel heights]. What is
+    scattered beyond the image is lost.
     """
 
     title: ClassVar[str] = "stray light"
