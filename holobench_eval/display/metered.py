@@ -110,6 +110,7 @@ class MeteredDisplay:
         self._kept: Tensor | None = None
         self._over = ""
         self._frames = set[str]()
+        self.shown = 0
 
     def __repr__(self) -> str:
         most = "no limit" if self.budget is None else f"at most {self.budget}"
@@ -213,6 +214,7 @@ class MeteredDisplay:
             self._over = str(error)
             raise
         capture = camera.capture(phase)
+        self.shown += len(phase) if phase.ndim == 4 else 1
         self._frames.add(_digest(capture))
         return capture
 

@@ -39,7 +39,7 @@ class Solution:
     phase: ``(C, H, W)`` [rad]; captures: that it took; cost: without the memory where another method began with it;
     stopped: why the display ended it (empty: it did not); learned: sha256 of what the method had learned (empty:
     nothing); alone: whether it was timed without concurrent workers; covered, uncovered: what a user's code was seen to
-    read (``isolation.Reads``); reused: whether it is from before.
+    read (``isolation.Reads``); reused: whether it is from before; shown: frames of its captures (None: unknown).
     """
 
     phase: Tensor
@@ -51,6 +51,7 @@ class Solution:
     covered: dict[str, str] = field(default_factory=dict)
     uncovered: tuple[str, ...] = ()
     reused: bool = False
+    shown: int | None = None
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,8 @@ class Record:
     capture: its description (``identity.capture``), which names the record; state: ``done``, or why there is none in
     ``reason``; label, condition, target: its names in tables; scores: by metric; figures: what else was measured of
     it, by column; captures: camera captures that the method took, those of failed attempts included; frames: of the
-    hologram, which share the exposure; seconds: wall
-    time of the solution; reused: whether that was solved before, for another display, study or run; alone: whether it
+    hologram, which share the exposure; shown: frames that the solution's captures showed; seconds: wall time of the
+    solution; reused: whether that was solved before, for another display, study or run; alone: whether it
     was timed without concurrent workers (None: unknown); memory_mib: peak of resident memory above the level before the
     solution [MiB]; cpu_s: its time of all processors;
     registration_residual_px: rms error of the registration, in pixels of the scored region; saturated: fraction of
@@ -72,6 +72,7 @@ class Record:
     figures: dict[Column, FiniteFloat] = field(default_factory=dict)
     captures: Annotated[int, Interval(ge=0, le=10**9)] = 0
     frames: Annotated[int, Interval(ge=1, le=256)] = 1
+    shown: Annotated[int, Interval(ge=0)] | None = None
     seconds: Amount | None = None
     reused: bool = False
     alone: bool | None = None

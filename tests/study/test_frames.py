@@ -20,6 +20,21 @@ def several(target, bench, frames: int = 1, wrong: bool = False):
     phase = 6 * torch.rand(shape, generator=bench.generator("frames"))
     return phase[..., 1:] if wrong else phase
 """
+CAMERA = """
+import torch
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Looks:
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.zeros(target.shape[1], *bench.spec.shape)
+        for _ in range(3):
+            bench.capture(phase)
+        return phase.expand(1, 4, *phase.shape)
+"""
 STUDY = """
 title: frames
 seed: 1
@@ -68,4 +83,14 @@ def test_panel_time_counts_the_frames_of_every_capture() -> None:
     assert column.unit == "frames"
     assert column.source is not None
     records = [{"frames": 8, "captures": 0}, {"frames": 8, "captures": 50}, {"captures": 50}, {"frames": 8}]
-    assert [column.source(record, None) for record in records] == [8, 408, 51, None]
+    records.append({"frames": 4, "captures": 5, "shown": 5})
+    assert [column.source(record, None) for record in records] == [8, 408, 51, None, 9]
+
+
+def test_a_method_may_photograph_one_frame_and_give_several(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(CAMERA)
+    (tmp_path / "study.yaml").write_text(STUDY.format(display="flc-1bit", methods="'mine.py:Looks'"))
+    record = next(
+        each for each in compute(tmp_path / "study.yaml", tmp_path / "out").records if each["label"] == "Looks"
+    )
+    assert (record["captures"], record["shown"], record["frames"]) == (3, 3, 4)

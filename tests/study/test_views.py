@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Task, plan
 from tests.study.studies import assert_refused, exchanged
@@ -76,8 +77,44 @@ def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(t
             (CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"),
             "4:20: dataset 'charts' has no views; measure: views needs one that has, such as light_fields",
         ),
+        (("[-0.4, 0.1, 0.4]", "[1.4]"), "4:51: dataset 'light_fields': parameter 'places.0'"),
+        (
+            ("light_field, params: {frames: 4", "light_field, params: {frames: 9"),
+            "7:12: frames: 9; 'ideal-frames' shows 8",
+        ),
         (("profiles: [ideal-frames.yaml]", "profiles: [pluto-fourier]"), "2:10: measure: views needs a Fresnel plane"),
     ],
 )
 def test_what_has_no_views_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
     assert_refused(write(tmp_path, change), message)
+
+
+DATASET = """
+from holobench_eval.datasets.light_fields import LightFields
+
+class Wide(LightFields):
+    def place(self, view):
+        return 3 * super().place(view)
+"""
+METHOD = """
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Blind:
+    views: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        return target
+"""
+
+
+def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "wide.py").write_text(DATASET)
+    path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'wide.py:Wide', params"))
+    with pytest.raises(UserError, match=r"from -1\.2.*; expected places from '-1' to '1' radii of the iris"):
+        load_study(path)
+    (tmp_path / "blind.py").write_text(METHOD)
+    path = write(tmp_path, ("{name: wirtinger, params: {iterations: 30}}", "'blind.py:Blind'"))
+    with pytest.raises(UserError, match=r"Blind': views is True, which needs a function solve_views"):
+        load_study(path)

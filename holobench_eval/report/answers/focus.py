@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..data.board import Board
-from ..data.phrases import difference, marked, tested, verdict
+from ..data.phrases import difference, marked, tested, value, verdict
 from ..data.results import Results
 from ..data.text import number
 from ..markdown import Markdown, table
@@ -26,6 +26,8 @@ def verdicts(results: Results) -> Iterator[str]:
         ]
         if parts:
             yield f"{condition}, against {layout.baseline}: {'; '.join(parts)}."
+        elif rows := results.methods(condition):
+            yield f"{condition}: {'; '.join(f'{label} {value(results, label, condition)}' for label in rows)}."
 
 
 def made_of(results: Results, label: str) -> str:

@@ -236,9 +236,9 @@ def frames(record: Record, layout: Layout) -> int:
 
 @column(FIGURES, "count", unit="frames", kept=_if_several, table=mean, heading="panel time [frames]")
 def panel_time(record: Record, layout: Layout) -> int | None:
-    """Frames shown for the picture: those of the hologram, in each capture of solving and in the one that is scored."""
-    taken = record.get("captures")
-    return None if taken is None else int(record.get("frames", 1)) * (taken + 1)
+    """Frames shown for the picture, in the captures of solving and in the one that is scored."""
+    taken, own, shown = record.get("captures"), int(record.get("frames", 1)), record.get("shown")
+    return None if taken is None else own + (own * taken if shown is None else shown)
 
 
 @column(FIGURES, "number")

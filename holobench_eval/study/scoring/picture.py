@@ -64,6 +64,7 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
         reused=solved.reused,
         alone=solved.alone,
         frames=len(solved.phase) if solved.phase.ndim == 4 else 1,
+        shown=solved.shown,
         registration_residual_px=capture.residual,
         saturated=capture.saturated,
         learned=account(job.learned(job.task.preparation)),

@@ -97,6 +97,7 @@ def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: 
         alone=job.alone,
         covered={**job.target_reads(), **ready.reads.covered},
         uncovered=ready.reads.uncovered,
+        shown=handle.shown,
     )
 
 

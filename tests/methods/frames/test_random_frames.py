@@ -9,9 +9,11 @@ import pytest
 import torch
 from torch import Tensor
 
+from holobench_eval.core.errors import UserError
 from holobench_eval.datasets.photographs import Photographs
 from holobench_eval.display import load_profile
 from holobench_eval.display.api import ideal_light
+from holobench_eval.methods.coarse.levels import Levels
 from holobench_eval.methods.common import matched, unit_field
 from holobench_eval.methods.frames.random_frames import RandomFrames
 from holobench_eval.methods.wirtinger import Wirtinger
@@ -42,6 +44,23 @@ def test_together_frames_gain_more_and_one_smooth_frame_beats_eight_alone() -> N
     smooth = quality(Wirtinger(iterations=100).solve(TARGET[None], Bench(SPEC))[0])
     assert quality(frames(1)) + 2 < quality(frames(8)) < smooth
     assert quality(frames(4, together=True)) > quality(frames(8)) + 2
+
+
+def test_frames_are_on_the_levels_of_a_published_table_and_no_more_than_a_display_shows() -> None:
+    spec = replace(load_profile("plm-4bit").spec((64, 64)), wavelengths=(517e-9,))
+    target = Photographs(names=("camera",)).load("camera", spec.region.shape)[None, 1:2].float()
+    phase = RandomFrames(2, iterations=3).solve(target, Bench(spec))
+    levels = Levels(spec, 0, phase)
+    assert torch.allclose(levels.shown_by(levels.nearest(nominal_phase(phase, levels))), phase)
+    with pytest.raises(UserError, match=f"frames: 99; 'plm-4bit' shows {spec.frames} at most in an exposure"):
+        RandomFrames(99).refuse_display(spec)
+
+
+def nominal_phase(phase: Tensor, levels: Levels) -> Tensor:
+    """The phase of the light of the level that a display shows for a phase."""
+    step = 2 * torch.pi / len(levels.phases)
+    shown = (phase - levels.shown_by(torch.zeros_like(phase))) / step
+    return levels.light(shown.round().long() % len(levels.phases))
 
 
 def test_the_error_of_random_holograms_that_nothing_improves_falls_as_a_and_b_over_their_number() -> None:

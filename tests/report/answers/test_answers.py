@@ -321,6 +321,7 @@ def focused() -> Results:
 
 def test_focus_compares_one_hologram_of_all_planes_with_one_a_plane() -> None:
     assert answer(focused()) == "bench, against lens: joint (of all planes) -3.33 dB [-4.10, -2.56]."
+    assert answer(focus.results_of({"joint": 18.0}, baseline=None)) == "bench: joint 16.87 dB."
 
 
 def test_an_error_budget_names_every_part_and_what_removing_it_would_gain() -> None:
