@@ -12,9 +12,10 @@ from holobench_eval.commands import main
 from holobench_eval.commands.twin import twin
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
+from holobench_eval.methods.twin import method
 from holobench_eval.report.description import basis
 from holobench_eval.study.calibration import twin as twins
-from tests.support.small_training import QUICK
+from tests.support.small_training import QUICK, SHORT_OPEN_LOOP
 
 PANEL = (128, 128)
 
@@ -36,6 +37,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
         return yaml.safe_dump(config)
 
     monkeypatch.setattr(twins, "study_text", text)
+    monkeypatch.setattr(method, "OPEN_LOOP", SHORT_OPEN_LOOP)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
