@@ -22,6 +22,12 @@ NAMES = [
     and name != "Beside"
 ]
 DIGITS = ("scores", "efficiency", "brightness", "saturated", "registration_residual_px")
+GREEN = """name: green
+like: leto-mild
+version: 1
+description: leto-mild with one laser.
+panel: {wavelengths: [5.17e-7]}
+"""
 PART = process.KEPT - 4  # attempts of a study, else their processes would be started again for every step of it
 
 
@@ -33,9 +39,10 @@ def scored(folder: Path, names: list[str], calls: int, seconds: float, isolation
         listed += ", captures: 2}\n" if getattr(getattr(attempts, name), "camera", False) else "}\n"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "attempts.py").write_bytes(Path(attempts.__file__).read_bytes())
+    (folder / "green.yaml").write_text(GREEN)
     (folder / "study.yaml").write_text(
         f"""title: cheats
-display: {{profiles: [leto-mild], panel: [128, 160]}}
+display: {{profiles: [green.yaml], panel: [128, 128]}}
 targets: {{dataset: photographs, params: {{count: 1}}}}
 training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1, captures: 3}}
 protocol: {{metrics: [psnr]}}
