@@ -21,7 +21,7 @@ PANEL = (128, 128)
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> Path:
     """A folder where twins learn next to nothing, at once."""
     whole = twins.study_text
 
