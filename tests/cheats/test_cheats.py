@@ -11,6 +11,7 @@ import pytest
 
 from holobench_eval.study.isolation import process
 from tests.cheats import attempts
+from tests.study.studies import write_green
 from tests.study.test_run import compute
 
 NAMES = [
@@ -22,12 +23,6 @@ NAMES = [
     and name != "Beside"
 ]
 DIGITS = ("scores", "efficiency", "brightness", "saturated", "registration_residual_px")
-GREEN = """name: green
-like: leto-mild
-version: 1
-description: leto-mild with one laser.
-panel: {wavelengths: [5.17e-7]}
-"""
 PART = process.KEPT - 4  # attempts of a study, else their processes would be started again for every step of it
 
 
@@ -39,7 +34,7 @@ def scored(folder: Path, names: list[str], calls: int, seconds: float, isolation
         listed += ", captures: 2}\n" if getattr(getattr(attempts, name), "camera", False) else "}\n"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "attempts.py").write_bytes(Path(attempts.__file__).read_bytes())
-    (folder / "green.yaml").write_text(GREEN)
+    write_green(folder, "leto-mild")
     (folder / "study.yaml").write_text(
         f"""title: cheats
 display: {{profiles: [green.yaml], panel: [128, 128]}}
