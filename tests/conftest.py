@@ -1,6 +1,10 @@
 """Settings for every test: one thread, the same examples on every run, no deadlines on a shared machine."""
 
 import signal
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import matplotlib
@@ -8,6 +12,8 @@ import pytest
 import torch
 from hypothesis import settings
 
+from holobench_eval.commands import run as run_command
+from holobench_eval.core import yaml_source
 from holobench_eval.study.scoring import reference
 from tests.support import fake_study
 
@@ -16,6 +22,7 @@ settings.load_profile("repeatable")
 torch.set_num_threads(1)
 # A shell that starts the tests in the background has Ctrl-C ignored, and so would all processes that tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+SHEETS = run_command.sheets
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -37,6 +44,34 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
     monkeypatch.setenv("MPLCONFIGDIR", matplotlib.get_cachedir())  # else every test would look for the fonts anew
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_stage_sheets() -> Iterator[None]:
+    """They take seconds for each display of each run; tests that look at them ask for `stage_sheets`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_command, "sheets", lambda *_: [])
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _files_parsed_once() -> Iterator[None]:
+    """A study reads each profile for each of its methods, and many tests read the same ones."""
+    parsed = lru_cache(maxsize=256)(yaml_source.parse)
+
+    def parse(name: str, text: str) -> yaml_source.Document:
+        found = parsed(name, text)
+        return replace(found, data=deepcopy(found.data), keys=dict(found.keys), values=dict(found.values), options={})
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(yaml_source, "parse", parse)
+        yield
+
+
+@pytest.fixture
+def stage_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run draws the stages of its displays, as everywhere but in tests."""
+    monkeypatch.setattr(run_command, "sheets", SHEETS)
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 
 from holobench_eval.study.isolation import process
 from tests.cheats import attempts
+from tests.study.studies import write_green
 from tests.study.test_run import compute
 
 NAMES = [
@@ -33,9 +34,10 @@ def scored(folder: Path, names: list[str], calls: int, seconds: float, isolation
         listed += ", captures: 2}\n" if getattr(getattr(attempts, name), "camera", False) else "}\n"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "attempts.py").write_bytes(Path(attempts.__file__).read_bytes())
+    write_green(folder, "leto-mild")
     (folder / "study.yaml").write_text(
         f"""title: cheats
-display: {{profiles: [leto-mild], panel: [128, 160]}}
+display: {{profiles: [green.yaml], panel: [128, 128]}}
 targets: {{dataset: photographs, params: {{count: 1}}}}
 training: {{dataset: dead_leaves, params: {{count: 2}}, held_out: 1, captures: 3}}
 protocol: {{metrics: [psnr]}}

@@ -1,4 +1,4 @@
-"""A command as a person calls it."""
+"""A command as a person calls it, and where it computes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from holobench_eval.study import executors
 from tests.commands.test_commands import holoeval
 
 
@@ -17,3 +18,9 @@ def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
         return holoeval(monkeypatch, *arguments), *capsys.readouterr()
 
     return called
+
+
+@pytest.fixture
+def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run computes in the process of the tests, as on one core: workers begin with nothing open."""
+    monkeypatch.setattr(executors, "_cores", lambda: 1)

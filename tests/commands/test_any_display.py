@@ -67,6 +67,7 @@ def arguments(words: tuple[str, ...], function: Any, folder: Path, panel: list[i
     return values
 
 
+@pytest.mark.usefixtures("in_process", "stage_sheets")
 @pytest.mark.parametrize("display", DISPLAYS, ids=lambda each: f"{len(each[0])} x {each[1]} bits, {each[2]}")
 def test_every_command_that_takes_a_display_works_on_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, display: tuple[list[float], int, list[int]]

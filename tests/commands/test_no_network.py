@@ -16,7 +16,8 @@ targets: {dataset: photographs, params: {count: 1}}
 training: {dataset: dead_leaves, params: {count: 3}, held_out: 1}
 methods:
   - {name: wirtinger, params: {iterations: 2}}
-  - {name: parametric_model, params: {training: {rounds: 1, images: 2, steps: 2}}}
+  - name: parametric_model
+    params: {patterns: 2, training: {rounds: 1, images: 2, steps: 2}, retrieval: {iterations: 3}}
 """
 ALONE = ["unshare", "--net", "--map-root-user"]  # in a namespace of its own, where not even the loopback is up
 

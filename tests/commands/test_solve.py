@@ -29,7 +29,7 @@ def flat(target, bench):
 
 
 @pytest.fixture
-def picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> Path:
     monkeypatch.chdir(tmp_path)
     image = np.random.default_rng(1).integers(0, 256, (12, 15, 3)).astype(np.uint8)
     cv2.imwrite("my picture.png", cv2.resize(image, (300, 240)))

@@ -12,15 +12,17 @@ from holobench_eval.commands import main
 from holobench_eval.commands.twin import twin
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
+from holobench_eval.methods.twin import method
 from holobench_eval.report.description import basis
 from holobench_eval.study.calibration import twin as twins
-from tests.support.small_training import QUICK
+from tests.study.studies import write_green
+from tests.support.small_training import QUICK, SHORT_OPEN_LOOP
 
 PANEL = (128, 128)
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> Path:
     """A folder where twins learn next to nothing, at once."""
     whole = twins.study_text
 
@@ -36,6 +38,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
         return yaml.safe_dump(config)
 
     monkeypatch.setattr(twins, "study_text", text)
+    monkeypatch.setattr(method, "OPEN_LOOP", SHORT_OPEN_LOOP)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -44,9 +47,10 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     quick: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    twin("leto-aged", Path("lab"), panel=PANEL, pictures=3)
+    display = str(write_green(quick, "leto-aged"))
+    twin(display, Path("lab"), panel=PANEL, pictures=3)
     profile = load_profile("lab/lab.yaml")
-    assert (profile.name, profile.version, profile.twin.of) == ("lab", 1, "leto-aged")
+    assert (profile.name, profile.version, profile.twin.of) == ("lab", 1, "green")
     assert profile.spec().shape == PANEL
     assert "illumination.amplitude" in profile.held
     assert profile.twin.pictures == 3
@@ -58,9 +62,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert "| lab-turned |" in report
     assert "| twin (flattery) |" in report
     assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "work/trial/report.md"))
-    assert basis(profile).startswith(
-        f"simulated, a twin of leto-aged, trained with {photographs} photographs: its captur"
-    )
+    assert basis(profile).startswith(f"simulated, a twin of green, trained with {photographs} photographs: its captur")
     Path("lab/lab.npz").unlink()
     source = twins.in_folder(Path("lab"), Path("artifacts"))
     assert load_profile(str(twins.publish(twins.write_trial(source, "lab", Path("lab")), Path("lab")))).version == 2

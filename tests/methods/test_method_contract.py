@@ -20,8 +20,10 @@ from holobench_eval.methods.learned.retrieval import Image
 from holobench_eval.methods.predictors import veil
 from holobench_eval.methods.predictors.nested import NestedPrediction
 from holobench_eval.methods.simulated import through
+from holobench_eval.methods.twin import method as twin
 from holobench_eval.methods.wirtinger import Wirtinger
 from tests.support.small_training import (
+    SHORT_OPEN_LOOP,
     Fate,
     Killed,
     Memory,
@@ -53,6 +55,7 @@ def _short_holograms(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (patterns, veil, through):
         monkeypatch.setattr(module, "Wirtinger", lambda iterations=5: Wirtinger(iterations=iterations))
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=5))
+    monkeypatch.setattr(twin, "OPEN_LOOP", SHORT_OPEN_LOOP)
 
 
 def short(name: str) -> Any:

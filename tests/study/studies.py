@@ -25,6 +25,14 @@ def write_study(path: Path, *methods: str, **entries: str) -> Path:
     return path
 
 
+def write_green(folder: Path, like: str) -> Path:
+    """The file ``green.yaml`` of a display with one laser, for what is the same in every colour."""
+    path = folder / "green.yaml"
+    panel = "panel: {wavelengths: [5.17e-7]}"
+    path.write_text(f"name: green\nversion: 1\ndescription: One laser.\nlike: {like}\n{panel}\n")
+    return path
+
+
 def exchanged(text: str, *changes: tuple[str, str]) -> str:
     """A text with pieces exchanged, each of which it has."""
     for old, new in changes:

@@ -122,7 +122,6 @@ def test_a_changed_study_says_so_in_its_report_and_leaves_the_whole_one_alone(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     config = write_config(tmp_path)
-    monkeypatch.setattr(command, "sheets", lambda *_: [])
     command.run(config, executor="serial", threads=1)
     before = Path("holoeval-results/study/records.csv").read_bytes()
     command.run(config, executor="serial", threads=1, limit=2, values=["seed=4"])

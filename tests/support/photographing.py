@@ -70,7 +70,8 @@ class Lab:
             counts = counts + 20 * torch.randn(counts.shape, generator=draw)
             path = folder / row["save_photograph_as"]
             path.parent.mkdir(parents=True, exist_ok=True)
-            cv2.imwrite(str(path), counts.round().clamp(0, 65535).numpy().astype(np.uint16))
+            stored = counts.round().clamp(0, 65535).numpy().astype(np.uint16)
+            cv2.imwrite(str(path), stored, [cv2.IMWRITE_PNG_COMPRESSION, 0])  # noise, that only takes time to unpack
 
     def _phase(self, levels: np.ndarray, convention: dict) -> torch.Tensor:
         if convention["flip_horizontal"]:

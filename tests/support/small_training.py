@@ -9,7 +9,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -25,6 +25,10 @@ from holobench_eval.display.api import Capture, DisplaySpec, Region, white_irrad
 from holobench_eval.display.calibrated import CalibratedBench
 from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.training import TrainingBench, TrainingImage
+from holobench_eval.methods.gerchberg_saxton import GerchbergSaxton
+from holobench_eval.methods.sgd import AmplitudeSGD
+from holobench_eval.methods.twin.method import OPEN_LOOP
+from holobench_eval.methods.wirtinger import Wirtinger
 
 # Few iterations: what rounding does to a phase grows with them, and so does the time. A phase of few iterations leaves
 # wide gaps in the histogram that ``with_offset`` takes the emptiest bin of, where rounding would decide.
@@ -80,6 +84,12 @@ QUICK: dict[str, dict[str, Any]] = {
         for key in ("holonet", "ccnn", "tensor_holography", "unet_phase")
     },
 }
+
+# What a twin learns from, where no number hangs on how far holograms have converged.
+SHORT_OPEN_LOOP = tuple(
+    replace(method, iterations=5) if isinstance(method, (Wirtinger, AmplitudeSGD, GerchbergSaxton)) else method
+    for method in OPEN_LOOP
+)
 
 
 def quick(name: str) -> Any:

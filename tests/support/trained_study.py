@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from holobench_eval.commands import main
-from holobench_eval.commands import run as run_command
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import Preparation
@@ -78,11 +77,10 @@ def rounds(folder: Path) -> list[int]:
 
 
 def holoeval(patch: pytest.MonkeyPatch, config: Path, *options: str) -> int:
-    """The exit code of ``holoeval run``; no pictures of displays are drawn."""
+    """The exit code of ``holoeval run``."""
     folder = config.parent
     command = ["holoeval", "run", str(config), "--executor", "serial", "--output", str(folder / "out")]
     patch.setattr(sys, "argv", [*command, "--artifacts", str(folder / "artifacts"), *options])
-    patch.setattr(run_command, "draw_sheets", lambda *_: None)
     with pytest.raises(SystemExit) as stopped:
         main()
     code = stopped.value.code

@@ -31,7 +31,10 @@ SHORT = HILTerms(
 
 
 def hazy_display() -> CalibratedBench:
-    return open_bench(replace(load_profile("ideal").scaled(PANEL), stray_light=StrayLight(0.5, 0.125)), PANEL, 0)
+    """Of one laser: haze is the same in each."""
+    profile = load_profile("ideal").scaled(PANEL)
+    panel = replace(profile.panel, wavelengths=(5.17e-7,))
+    return open_bench(replace(profile, panel=panel, stray_light=StrayLight(0.5, 0.125)), PANEL, 0)
 
 
 def lost_beside_the_dark(even: Tensor, half: Tensor) -> float:

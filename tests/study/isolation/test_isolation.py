@@ -59,7 +59,8 @@ class Odd(Mine):
 SHIPPED = (
     "double_phase",
     "{name: online_camera, captures: 4}",
-    "{name: parametric_model, params: {training: {rounds: 1, images: 2, steps: 4}}}",
+    "{name: parametric_model, params: {patterns: 2, training: {rounds: 1, images: 2, steps: 4}, "
+    "retrieval: {iterations: 3}}}",
     "{name: oracle, params: {start_iterations: 1, rounds: 1, iterations: 2}}",
 )
 """One that is computed at once, and one each that photographs, that learns and that looks into the bench."""
