@@ -1,4 +1,4 @@
-"""Stochastic-gradient phase retrieval of Neural Holography, with autograd in the place of a written-out gradient.
+"""Stochastic-gradient phase retrieval of Neural Holography: descent on the squared error of amplitude.
 
 Peng, Choi, Padmanaban & Wetzstein, "Neural holography with camera-in-the-loop training", ACM Trans. Graph. 39(6),
 185 (2020).
@@ -12,10 +12,11 @@ from typing import Annotated, ClassVar
 from annotated_types import Interval
 from torch import Tensor
 
-from .common import Bench, ByColour, Offset, nominal_model, unit_field, with_offset
-from .descent import adam, by_autograd
+from .common import Bench, ByColour, Offset, nominal_model, with_offset
+from .descent import adam
 from .initial_phase import InitialPhase, initial_phase
 from .losses import amplitude_l2
+from .wirtinger import Objective
 
 
 @dataclass(frozen=True)
@@ -48,10 +49,6 @@ class AmplitudeSGD(ByColour):
 
     def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         """The phase of the least loss that was seen (Peng et al. 2020)."""
-        model, region = nominal_model(bench, channel, target), bench.spec.region
-
-        def loss(phase: Tensor) -> Tensor:
-            return amplitude_l2(region.crop(model.forward(unit_field(phase))).abs().square(), target)
-
+        objective = Objective(nominal_model(bench, channel, target), bench.spec.region, target, amplitude_l2)
         start = initial_phase(self.initial_phase, target, bench, channel)
-        return with_offset(adam(start, by_autograd(loss), self.iterations, self.step), self.offset)
+        return with_offset(adam(start, objective.evaluate, self.iterations, self.step), self.offset)

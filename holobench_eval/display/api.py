@@ -17,6 +17,7 @@ from ..optics import AngularSpectrum, FourierLens, Propagator
 from ..optics.convolution import frequencies
 from ..optics.fourier import picture_pitch
 from ..optics.phase import TAU, Matrix, blaze, gray_level, refocus
+from ..optics.phasor import phasor, squared_modulus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
@@ -400,10 +401,10 @@ def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
     if phase.ndim == 4:
         return torch.stack([ideal_light(frame, spec) for frame in phase]).mean(0)
     fields = [
-        spec.propagator(channel, device=panel.device).forward(torch.polar(torch.ones_like(panel), panel))
+        spec.propagator(channel, device=panel.device).forward(phasor(panel.new_ones(()), panel))
         for channel, panel in enumerate(phase.float())
     ]
-    return torch.stack(fields).abs().square()
+    return squared_modulus(torch.stack(fields))
 
 
 def nominal_levels(phase: Tensor, spec: DisplaySpec) -> Tensor:

@@ -11,6 +11,7 @@ from .scoring.job import Job
 from .training import TrainingJob
 
 DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings, and about what one takes
+QUICK = 1.0  # s of a job that may as well be the last one
 Drawing = Callable[[], None]  # of a picture that the report needs and that needs no cell
 Step = TrainingJob | Job | Drawing
 
@@ -65,7 +66,7 @@ class Queue:
             if not ready:
                 yield None
                 continue
-            longest = max(ready, key=lambda group: self._expected.get(group[0], math.inf))
+            longest = max(ready, key=lambda group: self._weight(group[0], len(groups[group])))
             yield groups[longest].popleft()
             if not groups[longest]:
                 del groups[longest]
@@ -73,6 +74,12 @@ class Queue:
             while self._begun:
                 yield None
             yield job
+
+    def _weight(self, label: str, left: int) -> tuple[float, int]:
+        """The job of the largest weight is next. left: jobs of its label. Labels of quick jobs go through the targets
+        side by side, since a process remembers what the scores need of a few targets."""
+        expected = self._expected.get(label, math.inf)
+        return (expected, 0) if expected > QUICK else (QUICK, left)
 
 
 def _needs(job: Job) -> frozenset[str]:

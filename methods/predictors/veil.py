@@ -19,11 +19,11 @@ from ...display.api import Region, ideal_light
 from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench, TrainingImage
 from ..calibrated.patterns import dark_patterns
-from ..calibrated.terms import spread
-from ..common import TINY, Offset, nominal_model, per_channel, unit_field, with_offset
-from ..descent import adam, by_autograd
+from ..calibrated.terms import scattered
+from ..common import TINY, Offset, nominal_model, per_channel, with_offset
+from ..descent import adam
 from ..losses import intensity_l2
-from ..wirtinger import Wirtinger
+from ..wirtinger import Objective, Wirtinger
 
 REACHES = tuple(2 ** (step / 8) / 64 for step in range(49))  # panel heights, 1/64 to 1
 SHARES = 200  # from 0 to 1 that are tried
@@ -102,19 +102,19 @@ class WirtingerVeil:
         def retrieve(target: Tensor, channel: int) -> Tensor:
             model, region = nominal_model(bench, channel, target), bench.spec.region
 
-            def loss(phase: Tensor) -> Tensor:
-                intensity = model.forward(unit_field(phase)).abs().square()
+            def loss(intensity: Tensor, target: Tensor) -> Tensor:
                 return intensity_l2(region.crop(veiled(intensity, share, reach)), target)
 
+            objective = Objective(model, Region(0, 0, *bench.spec.shape), target, loss)
             start = target.new_zeros((len(target), *bench.spec.shape))
-            return with_offset(adam(start, by_autograd(loss), self.iterations, self.step), self.offset)
+            return with_offset(adam(start, objective.evaluate, self.iterations, self.step), self.offset)
 
         return per_channel(target, retrieve)
 
 
 def veiled(intensity: Tensor, share: float, reach: float) -> Tensor:
     """An intensity ``(..., H, W)`` with its veil; it is dark beyond the picture."""
-    return (1 - share) * intensity + share * _veil(intensity, reach)
+    return (1 - share) * intensity + share * scattered(intensity, reach * intensity.shape[-2])
 
 
 def fitted(ideal: Tensor, captures: Tensor, region: Region) -> tuple[float, float]:
@@ -129,7 +129,7 @@ def fitted(ideal: Tensor, captures: Tensor, region: Region) -> tuple[float, floa
     for reach in REACHES:
         light, veil, seen = (
             (row := part.double().transpose(0, 1).flatten(1)) - row.mean(1, keepdim=True)  # a row a colour
-            for part in (region.crop(ideal), region.crop(_veil(ideal, reach)), captures)
+            for part in (region.crop(ideal), region.crop(scattered(ideal, reach * ideal.shape[-2])), captures)
         )
         a, b = 1 - shares[:, None], shares[:, None]
         overlap = a * (light * seen).sum(1) + b * (veil * seen).sum(1)
@@ -137,9 +137,3 @@ def fitted(ideal: Tensor, captures: Tensor, region: Region) -> tuple[float, floa
         errors.append(((seen**2).sum(1) - overlap**2 / power.clamp_min(TINY)).sum(1))
     best = int(torch.stack(errors).argmin())
     return float(shares[best % SHARES]), REACHES[best // SHARES]
-
-
-def _veil(intensity: Tensor, reach: float) -> Tensor:
-    height, width = intensity.shape[-2:]
-    rows, columns = (spread(side, intensity.new_full((1,), reach * height))[0] for side in (height, width))
-    return rows @ intensity @ columns.mT

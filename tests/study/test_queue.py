@@ -111,6 +111,15 @@ def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(lasts
     assert executor.rest() == [jobs[1], jobs[2], jobs[5]]
 
 
+def test_quick_jobs_of_all_labels_go_target_by_target(lasts: Callable[..., Any]) -> None:
+    labels = [f"{label} {target}" for label in ("quick", "long", "quicker") for target in range(3)]
+    jobs = {label: FakeJob(label) for label in labels}
+    executor = Executor([], list(jobs.values()))
+    assert [lasts(executor, seconds).name for seconds in (0.9, 5.0, 0.1)] == ["quick 0", "long 0", "quicker 0"]
+    order = ["long 1", "long 2", "quick 1", "quicker 1", "quick 2", "quicker 2"]
+    assert executor.rest() == [jobs[label] for label in order]
+
+
 def test_a_drawing_comes_before_the_jobs_that_are_shorter(lasts: Callable[..., Any]) -> None:
     jobs: Any = [FakeJob("long 1"), FakeJob("short 1"), FakeJob("long 2"), FakeJob("short 2")]
     drawing: Any = FakeTraining("drawing")

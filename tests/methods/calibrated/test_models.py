@@ -113,3 +113,4 @@ def test_a_network_sees_where_it_is_and_no_colour_but_its_own() -> None:
     changed = network(seen).detach()
     assert torch.equal(changed[0], answer[0])
     assert not torch.equal(changed[1], answer[1])
+    assert torch.allclose(network.requires_grad_(False)(seen), changed, atol=1e-5)  # held, it works colour by colour

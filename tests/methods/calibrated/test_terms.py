@@ -8,7 +8,7 @@ from torch import Tensor
 
 from holobench_eval.display.simulated.stages.stray_light import gaussian
 from holobench_eval.methods.calibrated.approximator import MODEL_BETAS
-from holobench_eval.methods.calibrated.terms import ImageTerms, spread
+from holobench_eval.methods.calibrated.terms import Haze, ImageTerms, scattered, spread
 from holobench_eval.methods.descent import cosine_decay
 from holobench_eval.metrics.error_budget import unexplained
 from tests.support.small_training import pictures, small_spec
@@ -54,6 +54,19 @@ def test_a_gaussian_keeps_its_light_inside_or_loses_what_is_spread_beyond_the_en
     assert torch.allclose(inside.sum(-1), torch.ones(2, 64))
     assert float(open_end[1, 32].sum()) == pytest.approx(1, abs=1e-3)
     assert float(open_end[1, 0].sum()) == pytest.approx(0.5 + 0.5 / (math.sqrt(math.tau) * 8), abs=1e-3)
+
+
+@pytest.mark.parametrize("width", [0.5, 4.0, 25.0, 200.0])
+def test_light_is_scattered_by_few_nodes_as_by_the_entire_gaussian(width: float) -> None:
+    image = torch.rand(2, 48, 64, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    rows, columns = (spread(side, torch.tensor([width], dtype=torch.float64))[0] for side in (48, 64))
+    assert torch.allclose(scattered(image, width), rows @ image @ columns.mT, atol=1e-7)
+
+
+def test_a_held_haze_is_that_which_was_learned() -> None:
+    haze, light = Haze(SPEC), pictures(SPEC, 1)[0]
+    learned = haze(light).detach()
+    assert torch.allclose(haze.requires_grad_(False)(light), learned, atol=1e-6)
 
 
 def test_a_dark_picture_has_finite_gradients() -> None:
