@@ -8,10 +8,8 @@ and under uneven light (0.17 instead of 0.14 px at the corners at speckle contra
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import cv2
 import numpy as np
@@ -83,25 +81,6 @@ class Registration:
     @cached_property
     def _coordinates(self) -> tuple[tuple[Frame, Frame], ...]:
         return tuple(warp.coordinates() for warp in self.warps)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain lists and numbers, for the record of a study; `from_dict` reads them back exactly."""
-        return {
-            "shape": list(self.warps[0].shape),
-            "homographies": [warp.homography.tolist() for warp in self.warps],
-            "quadratics": [warp.quadratic.tolist() for warp in self.warps],
-            "residual_px": list(self.residual),
-        }
-
-    @classmethod
-    def from_dict(cls, plain: Mapping[str, Any]) -> Registration:
-        """The registration that `to_dict` described."""
-        height, width = plain["shape"]
-        warps = tuple(
-            Warp((height, width), np.array(homography), np.array(quadratic))
-            for homography, quadratic in zip(plain["homographies"], plain["quadratics"], strict=True)
-        )
-        return cls(warps, tuple(plain["residual_px"]))
 
 
 def register(image: Tensor, grid: FiducialGrid, bound: float = 0.3) -> Registration:

@@ -31,14 +31,12 @@ TRIES = 2  # of every photograph, since drivers drop a frame now and then
 class Prepared:
     """What `Rig.prepare` measured.
 
-    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s]; checks: of
-    `preflight`, all passed.
+    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s].
     """
 
     exposures: tuple[float, ...]
     darks: tuple[Dark, ...]
     settle: float
-    checks: tuple[Check, ...]
 
 
 class Rig:
@@ -119,15 +117,13 @@ class Rig:
         darks = self._darks(exposures)
         level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
         say(f"dark: {level} counts{'' if self.settings.dark_frames else ' (as set)'}")
-        ready = Prepared(exposures, darks, settle, ())
-        checks = []
+        ready = Prepared(exposures, darks, settle)
         for check in self._checks(pattern, ready):
             if not check.passed:
                 raise UserError(check.line)
             say(check.line)
-            checks.append(check)
-        self.prepared = replace(ready, checks=tuple(checks))
-        return self.prepared
+        self.prepared = ready
+        return ready
 
     def _exposure(self, pattern: Request, channel: int) -> float:
         given = self.settings.exposures(len(self.planes))

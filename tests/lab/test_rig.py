@@ -62,7 +62,6 @@ def test_preparing_says_one_line_for_each_step_in_order_and_closing_turns_the_la
     assert [line.split(":")[0] for line in lines] == [*steps, "phase.two_pi_level"]
     assert all("\n" not in line for line in lines)
     assert len(ready.exposures) == len(ready.darks) == 3
-    assert all(check.passed for check in ready.checks)
     bench_rig.close()
     assert bench_rig.scene.selected[-1] is None
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from ..data.error_budget import Budget, Part
 from .look.medium import medium
-from .style import PALE, grid, legend_below, new_figure, save, style
+from .style import PALE, grid, laid_out, legend_below, save, style
 
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
@@ -29,13 +29,11 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         return
     colours = _colours(budgets)
     with style():
-        height, narrow = HEADER + ROW * len(budgets), medium().narrow
-        figure = new_figure(medium().width, round(medium().scale * (height * (1 + narrow) + LEGEND * (1 + narrow))))
-        figure.set_layout_engine("constrained")
-        if narrow:
-            left, right = figure.subplots(2, 1, sharey=True)
-        else:
-            left, right = figure.subplots(1, 2, sharey=True, width_ratios=[SHARES, GAINS])
+        narrow = medium().narrow
+        height = round(medium().scale * (HEADER + ROW * len(budgets) + LEGEND) * (1 + narrow))
+        shape, ratios = ((2, 1), None) if narrow else ((1, 2), [SHARES, GAINS])
+        figure, panels = laid_out(medium().width, height, *shape, sharey=True, width_ratios=ratios)
+        left, right = panels.flat
         for row, budget in enumerate(budgets):
             _shares(left, row, budget, colours)
             _gains(right, row, budget, colours)

@@ -136,11 +136,6 @@ class Ranks:
         found = mean_interval(self.taus)
         return replace(found, high=min(found.high, 1.0))  # no correlation is larger
 
-    @property
-    def unchanged(self) -> int:
-        """Draws in which every method has its nominal place."""
-        return int((self.positions == self.nominal_positions).all(axis=1).sum())
-
     @cached_property
     def features(self) -> dict[str, Array]:
         """``(draws,)`` of what was drawn, by words: an angle by sine and cosine, a signed one by its size, too."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.gallery import spread
+from ..data.results import Results
 from ..section import Report
 from .data import Json
 
@@ -59,7 +60,8 @@ def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
 
 
 def _numbers(report: Report, found: Pictures) -> Json:
-    results, displays, number = report.results, [*_pictured(report), *_changed(report)], found.numbers.get
+    results, number = report.results, found.numbers.get
+    displays = _pictured(results, [*results.conditions, *results.changed])
     targets, held = results.targets, Counter(target for *_, target in found.numbers)
     return {
         "targets": {name: [number(("", results.reference(name), target)) for target in targets] for name in displays},
@@ -91,18 +93,17 @@ def _note(report: Report, held: int, there: int) -> str:
 
 def groups(report: Report) -> Iterator[list[Cell]]:
     """The pictures that answer most, first things first: see ``pictures``."""
-    results, conditions = report.results, _pictured(report)
+    results, conditions = report.results, _pictured(report.results, report.results.conditions)
     if not conditions:
         return
-    ordered = report.thumbnails.by_quality(conditions[0])
-    first = spread(ordered, TARGETS_IN_FULL) if len(ordered) > TARGETS_IN_FULL else ordered
+    first = spread(report.thumbnails.by_quality(conditions[0]), TARGETS_IN_FULL)
     for target in first:
         cells = ((label, name, target) for name in conditions for label in results.methods(name))
         yield [*_truths(report, target), *cells]
     for target in results.targets:
         yield [*_truths(report, target), *_roles(report, conditions, target)]
     for target in first:
-        yield list(_roles(report, _changed(report), target))
+        yield list(_roles(report, _pictured(results, results.changed), target))
 
 
 def _truths(report: Report, target: str) -> list[Cell]:
@@ -122,18 +123,13 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
 def planned(report: Report) -> Iterator[Cell]:
     """The captures that a report could show."""
     results = report.results
-    for condition, target in itertools.product([*_pictured(report), *_changed(report)], results.targets):
+    shown = _pictured(results, [*results.conditions, *results.changed])
+    for condition, target in itertools.product(shown, results.targets):
         yield from ((label, condition, target) for label in results.methods(condition))
 
 
-def _pictured(report: Report) -> list[str]:
-    return [name for name in report.results.conditions if report.results.has_pictures(name)]
-
-
-def _changed(report: Report) -> list[str]:
-    """Conditions that are a change of another, in the order of the table."""
-    names = dict.fromkeys(report.results.table["condition"])
-    return [name for name in names if name in report.layout.changed and report.results.has_pictures(name)]
+def _pictured(results: Results, conditions: Iterable[str]) -> list[str]:
+    return [name for name in conditions if results.has_pictures(name)]
 
 
 def files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
