@@ -14,13 +14,13 @@ from torch import Tensor
 
 from ..core.errors import CellError, LostDeviceError, UserError
 from ..imaging.convention import Convention
+from .bench_file import CaptureSettings
 from .dark import Dark, given_dark
 from .devices import Camera, DeviceError, SequenceSlm, Slm
 from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
-from .settings import CaptureSettings
 from .settle import PATIENCE, Toggle, settle_time
 
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated

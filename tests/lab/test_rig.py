@@ -4,10 +4,10 @@ import torch
 
 from holobench_eval.core.errors import CellError, LostDeviceError, UserError
 from holobench_eval.imaging.convention import Convention
+from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.laser import SteadyLaser
 from holobench_eval.lab.photograph import Request, plane_of
 from holobench_eval.lab.rig import Rig
-from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import GREEN, FastSlm, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
 FAST = CaptureSettings(average=1, dark_frames=2)

@@ -9,7 +9,7 @@ from skimage import data
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging import Warp, fiducial, register
-from holobench_eval.imaging.grid_check import mismatch
+from holobench_eval.imaging.register import mismatch
 from holobench_eval.testing.grid_poses import corner_points, photograph, random_pose, speckle
 from holobench_eval.testing.registration_conformance import Outcome, accepted_impostors, conforms, errors, outcomes
 

@@ -86,3 +86,10 @@ KIND = Kind(
     applies=lambda results: True,
     verdicts=verdicts,
 )
+
+# Paper Table 2: how well does a method exploit the network that stands for the display?
+ON_A_NETWORK = Kind(
+    question="How good are the pictures that the learned display predicts?",
+    applies=lambda results: results.layout.learned_display is not None and results.layout.measure == "picture",
+    verdicts=verdicts,
+)

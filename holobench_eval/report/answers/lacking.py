@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...core.errors import listed
-from ...study.folders.remedies import remedies
+from ...study.folders.files import remedies
 from ..data.results import Results
 from ..data.text import FILES
 

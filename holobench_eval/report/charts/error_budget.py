@@ -24,9 +24,7 @@ DARKEST, LIGHTEST = 0.1, 0.9  # of the part of it that is used
 
 
 def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
-    """Draw the budgets of displays. Nothing is drawn without any."""
-    if not budgets:
-        return
+    """Draw the budgets of displays."""
     colours = _colours(budgets)
     with style():
         narrow = medium().narrow

@@ -12,10 +12,9 @@ from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
 from .categories import OFFLINE
-from .causes import Cause, cause
 from .layout import Swept
 from .results import Results
-from .statistics import Array, Estimate, mean_interval
+from .statistics import Array, Cause, Estimate, cause, mean_interval
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
