@@ -75,7 +75,9 @@ class Rig:
         second. CellError for a phase that the panel cannot show, and where a device fails twice; `LostDeviceError`
         where that happens to two photographs in a row.
         """
-        ready = self._ready()
+        ready = self.prepared
+        if ready is None:
+            raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
         self._check_phase(request.phase)
         try:
             taken = _patiently(lambda: self._take(request, self.convention, ready, self.settings))
@@ -206,11 +208,6 @@ class Rig:
             raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")
         if not phase.is_floating_point() or not bool(torch.isfinite(phase).all()):
             raise CellError("phase holds values that are no finite real numbers; the panel cannot show it")
-
-    def _ready(self) -> Prepared:
-        if self.prepared is None:
-            raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
-        return self.prepared
 
 
 def _patiently(take: Callable[[], Photograph]) -> Photograph:

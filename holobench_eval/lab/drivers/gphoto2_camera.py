@@ -16,7 +16,7 @@ from ...core.errors import UserError
 from ..devices import Counts, DeviceError
 from ..raw import RawFrame, is_jpeg, read_raw
 from .driver import Driver, import_package, only
-from .worker import Worker, closed_on_failure
+from .worker import Worker, asked, closed_on_failure
 
 OPENING = 60.0  # seconds, with a first picture
 CAPTURING = 30.0  # beyond the exposure, which long-exposure noise reduction may double
@@ -183,11 +183,7 @@ class Gphoto2Camera:
 def list_cameras() -> list[str]:
     """``Canon EOS Rebel T6i at usb:001,004`` for every camera that answers; UserError without the package."""
     gp = _gphoto2()
-    worker = Worker("libgphoto2")
-    try:
-        answering = worker.call("looking for cameras", CAPTURING, lambda: _answering(gp))
-    finally:
-        worker.stop(0, lambda: None)
+    answering = asked("libgphoto2", "looking for cameras", CAPTURING, lambda: _answering(gp))
     return [f"{model} at {port}" for model, port in answering]
 
 

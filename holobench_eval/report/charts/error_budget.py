@@ -61,11 +61,6 @@ def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
     return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
 
 
-def _is_dark(colour: str) -> bool:
-    """Whether white is legible on a colour."""
-    return float(np.dot(to_rgb(colour), (0.3, 0.6, 0.1))) < 0.5
-
-
 def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
     """The parts side by side from zero on; negative ones to its left, hatched."""
     right = left = 0.0
@@ -76,9 +71,9 @@ def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) ->
         colour = colours[part.label]
         axes.barh(row, share, left=start, height=0.5, color=colour, edgecolor="white", linewidth=0.5, hatch=hatch)
         if abs(share) >= LEGIBLE:
-            white = _is_dark(colour) and share > 0
-            words = f"{share:.0f}"
-            axes.text(start + share / 2, row, words, ha="center", va="center", color="white" if white else "black")
+            is_dark = float(np.dot(to_rgb(colour), (0.3, 0.6, 0.1))) < 0.5
+            ink = "white" if is_dark and share > 0 else "black"
+            axes.text(start + share / 2, row, f"{share:.0f}", ha="center", va="center", color=ink)
         right, left = (right + share, left) if share >= 0 else (right, left + share)
 
 
