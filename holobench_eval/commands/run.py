@@ -199,7 +199,7 @@ class Sheet:
 def sheets(study: Study, output: Path) -> list[Sheet]:
     """The sheet of every display of a study that has stages, of many the first; learned and real ones have none."""
     from ..display import load_profile
-    from ..report.data.causes import FEWEST_DISPLAYS
+    from ..report.data.statistics import FEWEST_DISPLAYS
     from ..study.displays import condition
 
     panel, folder, profiles = study.display.panel, study.folder, study.display.profiles

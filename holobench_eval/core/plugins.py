@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
@@ -129,16 +129,12 @@ def _plugin_class(kind: Kind, name: str, found: Any) -> type[Any]:
 def refuse_swapped(method: Any, owner: str) -> None:
     """UserError for a method, or its class or function, that takes bench and target by these names in this order."""
     try:
-        names = [name for name in _signature(method) if name != "self"]
+        # of a method's own function, not of one that it wraps
+        parameters = inspect.signature(getattr(method, "solve", method), follow_wrapped=False).parameters
     except (TypeError, ValueError):  # it is not called, or is one of C, which does not tell
         return
-    if names[:2] == ["bench", "target"]:
+    if [name for name in parameters if name != "self"][:2] == ["bench", "target"]:
         raise UserError(f"{owner} takes bench and target in this order; expected (target, bench)")
-
-
-def _signature(method: Any) -> Iterable[str]:
-    """Names of the parameters of a method's own function, not of one that it wraps."""
-    return inspect.signature(getattr(method, "solve", method), follow_wrapped=False).parameters
 
 
 def _is_function(kind: Kind, found: Any) -> bool:

@@ -14,13 +14,13 @@ from torch import Tensor
 
 from ..core.errors import CellError, LostDeviceError, UserError
 from ..imaging.convention import Convention
+from .bench_file import CaptureSettings
 from .dark import Dark, given_dark
 from .devices import Camera, DeviceError, SequenceSlm, Slm
 from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
-from .settings import CaptureSettings
 from .settle import PATIENCE, Toggle, settle_time
 
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
@@ -31,14 +31,12 @@ TRIES = 2  # of every photograph, since drivers drop a frame now and then
 class Prepared:
     """What `Rig.prepare` measured.
 
-    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s]; checks: of
-    `preflight`, all passed.
+    exposures [s], which a request's are relative to, and counts without light: per channel; settle [s].
     """
 
     exposures: tuple[float, ...]
     darks: tuple[Dark, ...]
     settle: float
-    checks: tuple[Check, ...]
 
 
 class Rig:
@@ -77,7 +75,9 @@ class Rig:
         second. CellError for a phase that the panel cannot show, and where a device fails twice; `LostDeviceError`
         where that happens to two photographs in a row.
         """
-        ready = self._ready()
+        ready = self.prepared
+        if ready is None:
+            raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
         self._check_phase(request.phase)
         try:
             taken = _patiently(lambda: self._take(request, self.convention, ready, self.settings))
@@ -119,15 +119,13 @@ class Rig:
         darks = self._darks(exposures)
         level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
         say(f"dark: {level} counts{'' if self.settings.dark_frames else ' (as set)'}")
-        ready = Prepared(exposures, darks, settle, ())
-        checks = []
+        ready = Prepared(exposures, darks, settle)
         for check in self._checks(pattern, ready):
             if not check.passed:
                 raise UserError(check.line)
             say(check.line)
-            checks.append(check)
-        self.prepared = replace(ready, checks=tuple(checks))
-        return self.prepared
+        self.prepared = ready
+        return ready
 
     def _exposure(self, pattern: Request, channel: int) -> float:
         given = self.settings.exposures(len(self.planes))
@@ -210,11 +208,6 @@ class Rig:
             raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")
         if not phase.is_floating_point() or not bool(torch.isfinite(phase).all()):
             raise CellError("phase holds values that are no finite real numbers; the panel cannot show it")
-
-    def _ready(self) -> Prepared:
-        if self.prepared is None:
-            raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
-        return self.prepared
 
 
 def _patiently(take: Callable[[], Photograph]) -> Photograph:

@@ -53,10 +53,6 @@ class Metric:
         ``(C, H, W)`` or ``(B, C, H, W)`` twice, in [0, 1], to a scalar or ``(B,)``.
     smallest
         Shortest image side that it is defined for [px].
-    symmetric
-        Whether the images may be exchanged.
-    differentiable
-        Whether autograd passes through.
     available
         Why it cannot be computed here and what to do about it, or None.
     title
@@ -74,8 +70,6 @@ class Metric:
     domains: tuple[Domain, ...]
     function: Function
     smallest: int = 1
-    symmetric: bool = True
-    differentiable: bool = True
     available: Callable[[], str | None] = always
     title: str = ""
     unit: str = ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import Literal
 
 from .base import Metric
 from .lpips import lpips_metric
@@ -20,15 +19,3 @@ def catalogue(lpips_weights: Path | None = None) -> tuple[Metric, ...]:
     """
     fixed: list[Metric] = [import_module(f".{name}", __package__).METRIC for name in NAMES]
     return (*fixed, lpips_metric("alex", lpips_weights), lpips_metric("vgg", lpips_weights))
-
-
-def direction(column: str) -> Literal["higher", "lower"] | None:
-    """Whether a column of ``score`` is better higher or lower; None for those that only describe the capture."""
-    if column == "speckle_contrast":
-        return "lower"
-    for metric in catalogue():
-        for domain in (*metric.domains, "stored"):
-            stem = f"{metric.name}_{domain}"
-            if column in (stem, f"{stem}_refined") or column.startswith(f"{stem}_blur"):
-                return metric.direction
-    return None

@@ -61,4 +61,4 @@ def _mean_of_strips(reference: Tensor, test: Tensor) -> float:
     return total / (height * width)
 
 
-METRIC = Metric("flip", "1", "lower", 0.0, ("srgb",), flip, differentiable=False, title="FLIP")
+METRIC = Metric("flip", "1", "lower", 0.0, ("srgb",), flip, title="FLIP")

@@ -72,4 +72,4 @@ def mdsi(image: Tensor, target: Tensor) -> Tensor:
     return torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(POWER), 0.0).reshape(image.shape[:-3])
 
 
-METRIC = Metric("mdsi", "1", "lower", 0.0, ("srgb",), mdsi, smallest=3, symmetric=False, title="MDSI")
+METRIC = Metric("mdsi", "1", "lower", 0.0, ("srgb",), mdsi, smallest=3, title="MDSI")

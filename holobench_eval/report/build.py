@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
 from ..core.io import write_atomically
 from ..study.definition import Study
+from .charts.look.medium import MEDIA, drawn_for
 from .data.layout import Layout, layout_of
 from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
@@ -17,7 +19,7 @@ from .description import Description, describe
 from .files import texts, write_files
 from .markdown import FIGURE, Markdown, blocks
 from .page import write_page
-from .page.copies import keep_copies
+from .page.pictures import keep_copies
 from .section import Report
 from .sections import sections
 
@@ -108,3 +110,25 @@ def related(layout: Layout, folder: Path) -> dict[str, Results]:
 def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
     """The text of every file of data, by name, computed anew from that of records.csv; equal bytes belong together."""
     return texts(Results(of_study(read_records(records_csv), layout), layout))
+
+
+@dataclass(frozen=True)
+class _Printed(Report):
+    """A report whose figures go elsewhere."""
+
+    folder: Path = field(kw_only=True)
+
+    @property
+    def figures(self) -> Path:
+        return self.folder
+
+
+def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
+    """Draw the charts of a report for one of ``MEDIA`` into a folder; every file."""
+    parts = report.results, report.records, report.output, report.provenance, report.description
+    printed = _Printed(*parts, kept={}, folder=folder)  # none of the figures made of pictures
+    with drawn_for(MEDIA[medium]):
+        for section in sections():
+            if section.applies(printed):
+                for path, _ in section.figures(printed):
+                    yield from (path.with_suffix(suffix) for suffix in MEDIA[medium].suffixes)

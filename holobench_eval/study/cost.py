@@ -108,7 +108,8 @@ def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
     in a process whose program break could not be raised: glibc keeps that).
     """
     if process is None:
-        _collect()
+        gc.collect()
+        _freeze()
         give_back_freed_memory()
     if device.type == "cuda" and process is None:
         torch.cuda.synchronize(device)
@@ -172,17 +173,12 @@ def _started(process: int) -> list[int]:
     return [number for number in numbers if number != process]
 
 
-def _collect() -> None:
-    """Collect garbage, and freeze the objects that exist before the first solution, most of them of libraries.
+@cache
+def _freeze() -> None:
+    """Freeze the objects that exist before the first solution, most of them of libraries.
 
     Scanning them again would take 0.15 s, longer than some methods need to solve a target.
     """
-    gc.collect()
-    _freeze()
-
-
-@cache
-def _freeze() -> None:
     gc.freeze()
 
 

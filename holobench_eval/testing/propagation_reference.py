@@ -41,11 +41,6 @@ class Setting:
     pitch: float = PITCH
     wavelength: float = WAVELENGTH
 
-    @property
-    def arguments(self) -> tuple[tuple[int, int], float, float, float]:
-        """``(shape, pitch, wavelength, distance)``."""
-        return self.shape, self.pitch, self.wavelength, self.distance
-
 
 Rounded = Callable[[Tensor, Tensor, Setting], Tensor]
 """The phase 2 pi z sqrt(1 / lambda^2 - f^2), carrier included, as code forms it in float32."""

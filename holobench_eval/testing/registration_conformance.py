@@ -33,7 +33,6 @@ class Outcome:
 
     pose: Pose
     error: float
-    refusal: str
 
     @property
     def silently_wrong(self) -> bool:
@@ -46,9 +45,9 @@ def outcome(pose: Pose) -> Outcome:
     frame = torch.from_numpy(photograph(pose))
     try:
         registration = register(frame[None], fiducial(pose.shape))
-    except CellError as error:
-        return Outcome(pose, float("nan"), str(error))
-    return Outcome(pose, pose.corner_error(registration.warps[0].corners()), "")
+    except CellError:
+        return Outcome(pose, float("nan"))
+    return Outcome(pose, pose.corner_error(registration.warps[0].corners()))
 
 
 def outcomes(numbers: Iterable[int] = range(POSES)) -> list[Outcome]:

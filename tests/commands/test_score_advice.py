@@ -12,7 +12,7 @@ from holobench_eval.core.errors import CellError
 from holobench_eval.imaging.align import PLAIN, align
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.answers import kind_of
-from holobench_eval.report.answers.lacking import lacking
+from holobench_eval.report.answers.comparison import lacking
 from holobench_eval.study.folders import FILES
 from holobench_eval.study.folders.pairing import UNKNOWN
 from tests.support.synthetic_study import cell, layout, record, study

@@ -1,5 +1,3 @@
-import json
-
 import cv2
 import numpy as np
 import pytest
@@ -115,16 +113,6 @@ def test_every_channel_has_its_own_warp_and_rectify_undoes_it(grid):
     assert region.shape == (3, *SHAPE)
     inner = np.s_[:, 4:-4, 4:-4]
     assert float(np.abs(region.numpy() - picture.transpose(2, 0, 1))[inner].mean()) < 0.004
-
-
-def test_a_registration_survives_its_plain_description(grid):
-    draw = random("plain")
-    where = pose(draw, SHAPE, SENSOR)
-    found = registered(grid, where, SENSOR, draw, contrast=0.0)
-    again = Registration.from_dict(json.loads(json.dumps(found.to_dict())))
-    frame = torch.rand(1, *SENSOR, generator=torch.Generator().manual_seed(0))
-    assert torch.equal(again.rectify(frame), found.rectify(frame))
-    assert again.residual == found.residual
 
 
 def test_one_channel_without_a_grid_refuses_all(grid):

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.lab.bench_file import load_bench_file
+from holobench_eval.lab.bench_file import CaptureSettings, load_bench_file
 from holobench_eval.lab.drivers.catalogue import checked_params
 from holobench_eval.lab.laser import SwitchedLaser, laser
-from holobench_eval.lab.settings import CaptureSettings
 
 PAGE = Path(__file__).parents[2] / "docs" / "real-bench.md"
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.dark import Dark, given_dark
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.exposure import Averaged, FreshCamera, auto_exposure, averaged, combined, dark_frames
-from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import SimulatedCamera, Still
 
 

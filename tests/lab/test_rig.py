@@ -4,10 +4,10 @@ import torch
 
 from holobench_eval.core.errors import CellError, LostDeviceError, UserError
 from holobench_eval.imaging.convention import Convention
+from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.laser import SteadyLaser
 from holobench_eval.lab.photograph import Request, plane_of
 from holobench_eval.lab.rig import Rig
-from holobench_eval.lab.settings import CaptureSettings
 from tests.support.simulated_devices import GREEN, FastSlm, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
 
 FAST = CaptureSettings(average=1, dark_frames=2)
@@ -62,7 +62,6 @@ def test_preparing_says_one_line_for_each_step_in_order_and_closing_turns_the_la
     assert [line.split(":")[0] for line in lines] == [*steps, "phase.two_pi_level"]
     assert all("\n" not in line for line in lines)
     assert len(ready.exposures) == len(ready.darks) == 3
-    assert all(check.passed for check in ready.checks)
     bench_rig.close()
     assert bench_rig.scene.selected[-1] is None
 

@@ -3,9 +3,9 @@ import re
 import pytest
 
 from holobench_eval.report import Results, records_frame
+from holobench_eval.report.build import print_figures
 from holobench_eval.report.charts.look.medium import MEDIA
 from holobench_eval.report.description import Description
-from holobench_eval.report.printing import print_figures
 from holobench_eval.report.section import Report
 from tests.support import budget_study as budget
 

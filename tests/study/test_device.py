@@ -11,7 +11,7 @@ import torch
 
 from holobench_eval.commands import main
 from holobench_eval.core.device import CPU, repeatable
-from holobench_eval.report.sections.appendix import environment
+from holobench_eval.report.sections.setup import environment
 from holobench_eval.study import cost, provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial, executor

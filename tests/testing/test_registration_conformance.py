@@ -9,7 +9,7 @@ from skimage import data
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging import Warp, fiducial, register
-from holobench_eval.imaging.grid_check import mismatch
+from holobench_eval.imaging.register import mismatch
 from holobench_eval.testing.grid_poses import corner_points, photograph, random_pose, speckle
 from holobench_eval.testing.registration_conformance import Outcome, accepted_impostors, conforms, errors, outcomes
 
@@ -90,9 +90,9 @@ def test_circles_that_go_on_and_circles_in_between_are_told_apart_from_the_grid_
 
 def test_conformance_wants_few_refusals_small_errors_and_no_silent_ones():
     pose = random_pose(0)
-    good = [Outcome(pose, 0.1, "")] * 99
+    good = [Outcome(pose, 0.1)] * 99
     assert conforms(good)
-    assert conforms([*good, Outcome(pose, float("nan"), "refused")])
-    assert not conforms([*good, Outcome(pose, 1.1, "")])
-    assert not conforms([*good[:9], Outcome(pose, float("nan"), "refused")])
-    assert not conforms([Outcome(pose, 0.3, "")] * 10)
+    assert conforms([*good, Outcome(pose, float("nan"))])
+    assert not conforms([*good, Outcome(pose, 1.1)])
+    assert not conforms([*good[:9], Outcome(pose, float("nan"))])
+    assert not conforms([Outcome(pose, 0.3)] * 10)

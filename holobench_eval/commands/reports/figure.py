@@ -21,9 +21,8 @@ def figure(
 ) -> None:
     """Draw the charts of a study for a talk or a paper: from its records, or from a committed records.csv."""
     from ...report import Results, layout_of, records_frame
-    from ...report.build import related
+    from ...report.build import print_figures, related
     from ...report.description import describe
-    from ...report.printing import print_figures
     from ...report.section import Report
 
     found = load(config, output)

@@ -16,28 +16,10 @@ from ...core.errors import UserError, suggest
 from ...core.schema import typed
 from ...core.yaml_source import Document, load
 from ..api import DisplaySpec
+from . import stages as kinds
 from .maps import KEYS, MapFile, load_maps
 from .shelf import installed, shelves
 from .stage import Effect, Stage
-from .stages import (
-    AddedLens,
-    CoherentNoise,
-    Crosstalk,
-    Drift,
-    DustPlane,
-    Eye,
-    Flicker,
-    Illumination,
-    LookUpTable,
-    Panel,
-    PixelAperture,
-    Propagation,
-    Relay,
-    Sensor,
-    Spectrum,
-    StrayLight,
-    ZeroOrder,
-)
 from .trust import Trust
 
 PROFILES = Path(str(files(__package__) / "profiles"))
@@ -91,24 +73,24 @@ class Profile:
     version: Annotated[int, Interval(ge=1)]
     seed: int
     description: str
-    panel: Panel
+    panel: kinds.Panel
     sampling: Annotated[int, Interval(ge=1, le=7)] = 1
-    lens: AddedLens = AddedLens()
-    lut: LookUpTable = LookUpTable()
-    crosstalk: Crosstalk = Crosstalk()
-    aperture: PixelAperture | None = None
-    flicker: Flicker = Flicker()
-    spectrum: Spectrum = Spectrum()
-    illumination: Illumination = Illumination()
-    coherent_noise: CoherentNoise = CoherentNoise()
-    propagation: Propagation = field(default_factory=Propagation)
-    eye: Eye = Eye()
-    zero_order: ZeroOrder = ZeroOrder()
-    dust_plane: DustPlane = field(default=DustPlane(), metadata={"key": False})
-    stray_light: StrayLight = StrayLight()
-    relay: Relay = Relay()
-    sensor: Sensor = Sensor()
-    drift: Drift = Drift()
+    lens: kinds.AddedLens = kinds.AddedLens()
+    lut: kinds.LookUpTable = kinds.LookUpTable()
+    crosstalk: kinds.Crosstalk = kinds.Crosstalk()
+    aperture: kinds.PixelAperture | None = None
+    flicker: kinds.Flicker = kinds.Flicker()
+    spectrum: kinds.Spectrum = kinds.Spectrum()
+    illumination: kinds.Illumination = kinds.Illumination()
+    coherent_noise: kinds.CoherentNoise = kinds.CoherentNoise()
+    propagation: kinds.Propagation = field(default_factory=kinds.Propagation)
+    eye: kinds.Eye = kinds.Eye()
+    zero_order: kinds.ZeroOrder = kinds.ZeroOrder()
+    dust_plane: kinds.DustPlane = field(default=kinds.DustPlane(), metadata={"key": False})
+    stray_light: kinds.StrayLight = kinds.StrayLight()
+    relay: kinds.Relay = kinds.Relay()
+    sensor: kinds.Sensor = kinds.Sensor()
+    drift: kinds.Drift = kinds.Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
     maps: MapFile = MapFile()
     twin: Trust = Trust()

@@ -17,7 +17,7 @@ from ..devices import DeviceError
 from .driver import Driver, check_levels, only
 from .screen_check import gamma_is_straight, grab
 from .window import Window, screens
-from .worker import Worker, closed_on_failure
+from .worker import Worker, asked, closed_on_failure
 
 SECONDS = 20.0  # a graphics driver that takes longer hangs
 GRABS = 20  # a desktop may take some frames until a new picture is on its screen
@@ -126,11 +126,7 @@ def described(screens: Sequence[Any]) -> list[str]:
 
 def list_monitors() -> list[str]:
     """The monitors of this desktop; UserError where there is none."""
-    worker = Worker("the desktop")
-    try:
-        return worker.call("listing its monitors", SECONDS, lambda: described(screens()))
-    finally:
-        worker.stop(SECONDS, lambda: None)
+    return asked("the desktop", "listing its monitors", SECONDS, lambda: described(screens()))
 
 
 def _name(screen: Any) -> str:

@@ -150,17 +150,15 @@ class OpencvCamera:
             raise DeviceError(f"{self.name} gives no frame")
         columns, rows = self._settings.resolution
         colour = self._settings.format == "YUYV"
-        frame = frame[..., ::-1] if colour else _unpacked(frame, rows, columns)
+        if colour:
+            frame = frame[..., ::-1]
+        elif frame.size == rows * columns:  # OpenCV gives what it does not convert with an axis too many, or as bytes
+            frame = frame.reshape(rows, columns)
         return np.ascontiguousarray(frame), value / 1e4 if linux else 2.0**value
 
     def _close(self) -> None:
         if self._capture is not None:
             self._capture.release()
-
-
-def _unpacked(frame: Counts, rows: int, columns: int) -> Counts:
-    """OpenCV gives frames that it does not convert with an axis too many, or as a row of bytes."""
-    return frame.reshape(rows, columns) if frame.size == rows * columns else frame
 
 
 def list_cameras() -> list[str]:

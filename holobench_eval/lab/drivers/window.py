@@ -83,7 +83,8 @@ class Window:
         gl.glTexImage2D(
             gl.GL_TEXTURE_2D, 0, gl.GL_RGBA8, columns, rows, 0, gl.GL_RGBA, gl.GL_UNSIGNED_BYTE, pixels.tobytes()
         )
-        self._attach()
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._source)
+        gl.glFramebufferTexture2D(gl.GL_READ_FRAMEBUFFER, gl.GL_COLOR_ATTACHMENT0, gl.GL_TEXTURE_2D, self._texture, 0)
         # the second time round both buffers hold the picture, and the first one has been on the screen
         self._blit(rows, columns)
         self._window.flip()
@@ -108,11 +109,6 @@ class Window:
         gl.glBindTexture(gl.GL_TEXTURE_2D, self._texture)
         for parameter in (gl.GL_TEXTURE_MIN_FILTER, gl.GL_TEXTURE_MAG_FILTER):
             gl.glTexParameteri(gl.GL_TEXTURE_2D, parameter, gl.GL_NEAREST)
-
-    def _attach(self) -> None:
-        gl = self._gl
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._source)
-        gl.glFramebufferTexture2D(gl.GL_READ_FRAMEBUFFER, gl.GL_COLOR_ATTACHMENT0, gl.GL_TEXTURE_2D, self._texture, 0)
 
     def _blit(self, rows: int, columns: int) -> None:
         """Copy pixel to pixel, the first row to the top: no shader, no filter."""

@@ -97,6 +97,15 @@ def closed_on_failure(close: Callable[[], object]) -> Iterator[None]:
         raise
 
 
+def asked(name: str, what: str, seconds: float, function: Callable[[], T]) -> T:
+    """What a function returns in a thread of its own, as ``Worker.call``, for what is asked only once."""
+    worker = Worker(name)
+    try:
+        return worker.call(what, seconds, function)
+    finally:
+        worker.stop(0, lambda: None)
+
+
 def line(error: BaseException) -> str:
     """An exception of somebody else's library as one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:300]

@@ -159,16 +159,13 @@ def check_order(
         expected, photographed = (np.stack([rows[pattern.capture] for pattern in same]) for rows in (wanted, seen))
         grids = np.array([pattern.role != HOLOGRAM for pattern in same])
         for index, (pattern, similarity) in enumerate(zip(same, photographed @ expected.T, strict=True)):
-            alike = grids if grids[index] else np.array([_of_one_target(pattern, other) for other in same])
+            of_one_target = [other is pattern or (pattern.target == other.target != "") for other in same]
+            alike = grids if grids[index] else np.array(of_one_target)
             own = similarity[grids].max() if grids[index] else similarity[index]
             best = int(np.where(alike, -np.inf, similarity).argmax())
             if similarity[best] > own + CLEARLY:
                 faults.append(f"wrong order: {pattern.capture} shows pattern {same[best].number:04d}")
     return faults
-
-
-def _of_one_target(pattern: Pattern, other: Pattern) -> bool:
-    return other is pattern or (pattern.target == other.target != "")
 
 
 def check_swaps(

@@ -19,8 +19,7 @@ from ..real import RealBench
 from . import FolderPhotographer
 from .checks import LISTED, check_order, check_swaps, grain, shortened, thumbnail
 from .manifest import DARK, REPEAT, Pattern
-from .prediction import predicted
-from .sign import sign_hint
+from .sign import predicted, sign_hint
 
 FURTHEST_DRIFT = 2.0  # region pixels that the bounded refinement of a capture still takes up (protocol, point 3)
 FINENESS = 20  # steps a pixel of the correlation that measures drift

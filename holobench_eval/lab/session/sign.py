@@ -7,23 +7,28 @@ predict the grid, so that a photograph tells which of the two it is, once it is 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
+from pathlib import Path
 
 import cv2
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
-from ...core.errors import CellError
+from ...core.errors import CellError, UserError
+from ...core.pictures import open_picture
 from ...imaging.align import align
 from ...imaging.circles import find_circles
 from ...imaging.grid import fiducial
 from ...imaging.warp import Warp
 from ...methods.fiducials import HOLOGRAMS, STEPS
+from ...optics.phase import blaze
 from ..real import RealBench
 from .checks import grain
 from .folder import FolderPhotographer
-from .manifest import FIDUCIAL
-from .prediction import predicted
+from .frames import MOST_PIXELS
+from .manifest import FIDUCIAL, FrameFile, Pattern, inside
 
 Light = NDArray[np.float32]
 
@@ -78,3 +83,25 @@ def _amplitude(light: Light) -> Light:
     """Square root of the light as a picture ``(1, h, w)`` in [0, 1]."""
     amplitude = np.sqrt(np.maximum(light, 0))[None]
     return np.asarray(amplitude / max(float(amplitude.max()), 1e-12), dtype=np.float32)
+
+
+def predicted(
+    bench: RealBench, photographer: FolderPhotographer, pattern: Pattern, sign: int = 1
+) -> NDArray[np.float32]:
+    """Light ``(h, w)`` of a pattern in the region; sign: -1 for a panel whose phase has the other sign than stated.
+
+    UserError for a pattern that is not as it was exported.
+    """
+    levels = np.stack([_levels(photographer.folder, frame) for frame in pattern.shown])
+    shown = photographer.manifest.phase.of(pattern.colour).phase(levels).float()
+    phase = sign * shown - blaze(bench.spec.shape, bench.carrier)
+    field = bench.spec.propagator(pattern.colour).forward(torch.polar(torch.ones_like(phase), phase))
+    return np.asarray(bench.spec.region.crop(field.abs().square().mean(0)).numpy())
+
+
+def _levels(folder: Path, frame: FrameFile) -> NDArray[np.uint8]:
+    path = inside(folder, frame.file)
+    content = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(content).hexdigest() != frame.sha256:
+        raise UserError(f"{path}: is not the pattern that was exported; put it back, or export a new session")
+    return np.asarray(open_picture(content, MOST_PIXELS).values(), dtype=np.uint8)

@@ -9,7 +9,6 @@ from . import (
     comparison,
     error_budget,
     focus,
-    learned_display,
     over_displays,
     prediction,
     ranks,
@@ -20,7 +19,7 @@ from .kind import Kind
 # The first that applies answers; a comparison of methods is what any study is.
 KINDS = (
     error_budget.KIND,
-    learned_display.KIND,
+    comparison.ON_A_NETWORK,
     prediction.KIND,
     focus.KIND,
     ranks.KIND,

@@ -44,10 +44,6 @@ def _over(found: list[Budget]) -> Iterator[tuple[str, Array]]:
         yield parts[0].label, np.array([100 * part.share.mean for part in parts])
 
 
-def _percent(part: Part) -> str:
-    return percent(part.share)
-
-
 def _interval(found: Estimate) -> str:
     mean, low, high = (f"{value:z.1f}" for value in (found.mean, found.low, found.high))
     return mean if low == "nan" else f"{mean} [{low}, {high}]"
@@ -66,7 +62,7 @@ def rows(board: Board) -> Markdown | None:
         [
             budget.condition,
             part.label,
-            _percent(part),
+            percent(part.share),
             _interval(part.gain) if part.gain else "–",
             percent(part.alone),
             *(_control(results, score, part, budget.condition) for score in results.control),

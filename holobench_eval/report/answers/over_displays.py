@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.causes import cause
 from ..data.display_map import display_map, judged
 from ..data.over_displays import Margin, applies, gains, margins, parameters, published, shown_on, winners
 from ..data.results import Results
+from ..data.statistics import cause
 from ..data.text import words
 from ..markdown import Markdown, table
 from .kind import Kind, subjects

@@ -45,11 +45,6 @@ def _followed(results: Results, before: str) -> list[str]:
     return list(dict.fromkeys([*subjects(results), *(best[0] or best[1])]))
 
 
-def value_text(sweep: Sweep, value: float | str) -> str:
-    """A value with its unit, as in a config."""
-    return f"{f'{value:g}' if isinstance(value, float) else value} {sweep.kind.unit}".strip()
-
-
 def _costs(here: list[Sweep], label: str) -> Iterator[str]:
     """The largest mean loss of a method, and whether its lead over the baseline lasts."""
     losses = [(worst[1], sweep, worst[0]) for sweep in here if label in sweep.methods and (worst := sweep.worst(label))]
@@ -57,7 +52,7 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
         return
     loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
     score, before = sweep.results.headline, sweep.swept.before
-    cost = f"{label} loses at most {difference(score, loss)} ({sweep.kind.words}, {value_text(sweep, value)})"
+    cost = f"{label} loses at most {difference(score, loss)} ({sweep.kind.words}, {sweep.text(value)})"
     lead, baseline = sweep.gain(label, before), sweep.results.layout.baseline
     if lead is None or label == baseline:
         yield cost
@@ -122,7 +117,7 @@ def _claim(sweep: Sweep, label: str, claim: Claim) -> str:
     value, name = max(points, key=lambda point: losses[point[1]].mean)
     loss = losses[name]
     holds = "holds" if loss.high <= SMALL else "does not hold" if loss.low > SMALL else "is not shown to hold or fail"
-    where = f"{sweep.kind.words}, {value_text(sweep, value)}"
+    where = f"{sweep.kind.words}, {sweep.text(value)}"
     return f'"{claim.says}" {holds} for {label}: it loses at most {difference(score, loss)} ({where}).'
 
 
@@ -138,7 +133,7 @@ def rows(board: Board) -> Markdown | None:
             gained = sweep.gain(label, dict(sweep.swept.points)[value]) if baseline and label != baseline else None
             online = ", solves after the change" * (results.layout.category(label) == ONLINE)
             line = [sweep.kind.words, sweep.swept.before, f"{results.layout.marked(label)}{online}"]
-            line += [value_text(sweep, value), score.estimate(loss, signed=True)]
+            line += [sweep.text(value), score.estimate(loss, signed=True)]
             lines.append([*line, *([score.estimate(gained, signed=True) if gained else "–"] if baseline else [])])
     columns = ["change", "display", "method", "worst at", f"mean loss there{score.brackets}"]
     columns += [f"above {baseline} there{score.brackets}"] if baseline else []

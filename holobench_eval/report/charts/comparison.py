@@ -14,7 +14,6 @@ import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from numpy.typing import NDArray
 
 from .gallery import CROP_FRACTION, Column, Picture, Tile, error_map, most_detailed
 from .rows import CAPTION, CHARACTER, GAP, HEADER, SIDE, Page, tile_size
@@ -95,12 +94,8 @@ def _draw_tile(page: Page, corner: tuple[int, int], tile: Tile, target: Picture,
     below, size, crop = top + tall + CAPTION, zoomed(target.shape), most_detailed(target)
     page.paste(left, below, size, crop.of(tile.picture))
     error = error_map(crop.of(tile.picture), crop.of(target))
-    page.paste(left + wide - size[1], below, size, _coloured(error, scale))
-
-
-def _coloured(error: NDArray[np.float64], scale: Normalize) -> Picture:
-    coloured: Picture = np.asarray(matplotlib.colormaps[ERROR_COLOURS](scale(error)))[..., :3]
-    return coloured
+    coloured = np.asarray(matplotlib.colormaps[ERROR_COLOURS](scale(error)))[..., :3]
+    page.paste(left + wide - size[1], below, size, coloured)
 
 
 def _colour_bar(page: Page, scale: Normalize) -> None:

@@ -13,7 +13,7 @@ from ..data.board import Display, Row
 from ..data.categories import ORACLE
 from .look.medium import medium
 from .look.methods import Look
-from .style import grid, save, stacked, style
+from .style import grid, marks, save, stacked, style, without_math
 
 TICKS = (0, 5, *(step * 10**power for power in range(1, 7) for step in (1, 2, 5)))
 PANEL, LINE, FOOTER = 320, 17, 10  # pixels of the screen: of a panel, of a name beside it
@@ -58,11 +58,9 @@ def _draw(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looked: Map
                 row.photographs or 0.0,
                 row.score.mean,
                 yerr=half if math.isfinite(half) else None,
-                fmt=look.marker,
-                color=look.face,
+                **marks(look, 6.5),
+                linestyle="none",
                 ecolor=look.colour,
-                markeredgecolor=look.colour,
-                markersize=6.5 * medium().scale ** 2,
                 capsize=2.5,
                 label=row.label,
                 zorder=3,
@@ -78,6 +76,4 @@ def _draw(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looked: Map
 
 def legend(axes: Axes) -> None:
     """The names of what is drawn, in rows to the right of the panel."""
-    found = axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=medium().note)
-    for text in found.get_texts():
-        text.set_parse_math(False)
+    without_math(axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=medium().note))

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from ..data.error_budget import Budget, Part
 from .look.medium import medium
-from .style import PALE, grid, legend_below, new_figure, save, style
+from .style import PALE, grid, laid_out, legend_below, save, style
 
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
@@ -24,18 +24,14 @@ DARKEST, LIGHTEST = 0.1, 0.9  # of the part of it that is used
 
 
 def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
-    """Draw the budgets of displays. Nothing is drawn without any."""
-    if not budgets:
-        return
+    """Draw the budgets of displays."""
     colours = _colours(budgets)
     with style():
-        height, narrow = HEADER + ROW * len(budgets), medium().narrow
-        figure = new_figure(medium().width, round(medium().scale * (height * (1 + narrow) + LEGEND * (1 + narrow))))
-        figure.set_layout_engine("constrained")
-        if narrow:
-            left, right = figure.subplots(2, 1, sharey=True)
-        else:
-            left, right = figure.subplots(1, 2, sharey=True, width_ratios=[SHARES, GAINS])
+        narrow = medium().narrow
+        height = round(medium().scale * (HEADER + ROW * len(budgets) + LEGEND) * (1 + narrow))
+        shape, ratios = ((2, 1), None) if narrow else ((1, 2), [SHARES, GAINS])
+        figure, panels = laid_out(medium().width, height, *shape, sharey=True, width_ratios=ratios)
+        left, right = panels.flat
         for row, budget in enumerate(budgets):
             _shares(left, row, budget, colours)
             _gains(right, row, budget, colours)
@@ -65,11 +61,6 @@ def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
     return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
 
 
-def _is_dark(colour: str) -> bool:
-    """Whether white is legible on a colour."""
-    return float(np.dot(to_rgb(colour), (0.3, 0.6, 0.1))) < 0.5
-
-
 def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
     """The parts side by side from zero on; negative ones to its left, hatched."""
     right = left = 0.0
@@ -80,9 +71,9 @@ def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) ->
         colour = colours[part.label]
         axes.barh(row, share, left=start, height=0.5, color=colour, edgecolor="white", linewidth=0.5, hatch=hatch)
         if abs(share) >= LEGIBLE:
-            white = _is_dark(colour) and share > 0
-            words = f"{share:.0f}"
-            axes.text(start + share / 2, row, words, ha="center", va="center", color="white" if white else "black")
+            is_dark = float(np.dot(to_rgb(colour), (0.3, 0.6, 0.1))) < 0.5
+            ink = "white" if is_dark and share > 0 else "black"
+            axes.text(start + share / 2, row, f"{share:.0f}", ha="center", va="center", color=ink)
         right, left = (right + share, left) if share >= 0 else (right, left + share)
 
 

@@ -11,7 +11,7 @@ from ...study.calibration.family import Range, Row
 from ..data.display_map import Map
 from .look.medium import medium
 from .look.methods import Look
-from .style import PALE, grid, legend_below, new_figure, save, style
+from .style import PALE, grid, laid_out, legend_below, new_figure, save, style
 
 SIDE, FRAME = 150, 90  # pixels: of a panel, around all
 BINS = 12
@@ -67,10 +67,9 @@ def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> N
     """
     with style():
         width, across = medium().width, 1 if medium().narrow else 2
-        figure = new_figure(width, round(width * (1.9 if medium().narrow else 0.55)))
-        figure.set_layout_engine("constrained")
-        panels = figure.subplots(2 // across, across, sharey=True, squeeze=False).flat
-        for axes, shares, name in zip(panels, 100 * found.shares.T, found.axes, strict=True):
+        height = round(width * (1.9 if medium().narrow else 0.55))
+        figure, panels = laid_out(width, height, 2 // across, across, sharey=True)
+        for axes, shares, name in zip(panels.flat, 100 * found.shares.T, found.axes, strict=True):
             for label, look in looked.items():
                 values = found.margins[found.labels.index(label)]
                 given = {
@@ -85,6 +84,6 @@ def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> N
             axes.axhline(0, color="black", linewidth=1)
             axes.set_xlabel(medium().wrap(f"error explained by {name} [%]", 0.84 * width / across), parse_math=False)
             grid(axes)
-        panels[0].set_ylabel(medium().wrap(axis, 0.4 * width), parse_math=False)
-        legend_below(figure, *panels[0].get_legend_handles_labels())
+        panels[0, 0].set_ylabel(medium().wrap(axis, 0.4 * width), parse_math=False)
+        legend_below(figure, *panels[0, 0].get_legend_handles_labels())
         save(figure, path)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from ...core.errors import PictureError
 from ...core.pictures import open_picture
 
 Picture = NDArray[np.float64]
+T = TypeVar("T")
 
 CROP_FRACTION = 9  # of a side of the picture: four times enlarged, two windows fit below it
 
@@ -88,7 +90,7 @@ def error_limit(errors: Sequence[NDArray[np.float64]]) -> float:
     return min(1.0, max(0.1, math.ceil(high * 10 - 1e-9) / 10))
 
 
-def spread(names: Sequence[str], most: int) -> list[str]:
-    """``most`` of ``names``, evenly spaced from first to last, in their order; ``2 <= most <= len(names)``."""
-    picks = np.linspace(0, len(names) - 1, most).round().astype(int)
-    return [names[index] for index in picks]
+def spread(items: Sequence[T], most: int) -> list[T]:
+    """``most`` items or all where they are no more, evenly spaced from first to last, in their order."""
+    picks = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
+    return [items[index] for index in picks]

@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
 
 from ..data import over_displays
 from ..data.results import Results
+from ..data.scores import Score
+from ..data.statistics import Array, Estimate
 from .look.medium import medium
-from .look.methods import looks
-from .quality import Row, best_first, draw_rows_of_dots, footer_of, height_of
-from .style import GREY, legend_below, save, slugs, stacked, style
+from .look.methods import Look, looks
+from .style import GREY, grid, legend_below, marks, save, slugs, stacked, style
+
+ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
+SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
+DOT, FEW = 9, 12  # size of a target's dot [square points], twice that for so few targets
+NAMES = 0.28  # of the width, for the names of the methods
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method: its name with marks, its ``(targets,)`` values (NaN: none), and their mean."""
+
+    name: str
+    values: Array
+    estimate: Estimate
+    look: Look
 
 
 def displays(results: Results) -> list[tuple[str, str]]:
@@ -29,17 +49,14 @@ def draw(results: Results, condition: str, path: Path) -> None:
     assert baseline is not None
     above = results.above_floor(baseline, condition)
     lines = {} if above is None else {"floor: a constant image": -above.mean}
-    rows = best_first(_rows(results, condition), score.higher_is_better)
+    rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
 
 
 def draw_over_displays(results: Results, path: Path) -> None:
     """Draw the mean differences of each display, best method first; dashed: differences that were published."""
-    score, looked, found = results.headline, looks(results.names), over_displays.margins(results)
-    rows = [
-        Row(each.label, each.values, each.over_both, looked[each.label], score.estimate(each.over_both, signed=True))
-        for each in found
-    ]
+    looked, found = looks(results.names), over_displays.margins(results)
+    rows = [Row(each.label, each.values, each.over_both, looked[each.label]) for each in found]
     known = {f"published for {each.label}": over_displays.published(results, each.label) for each in found}
     lines = {label: value for label, value in known.items() if value is not None}
     _draw(results, path, f"{len(over_displays.shown_on(results))} displays", rows, lines)
@@ -54,9 +71,12 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
     labels = [f"baseline: {baseline}"]
     labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
     labels = [medium().wrap(label, 0.8 * medium().width) for label in labels]
+    names = [medium().wrap(row.name, NAMES * medium().width) for row in rows]
+    height = FRAME + len(rows) * max(ROW, LINE * max(name.count("\n") + 1 for name in names))  # all are as high
+    footer = LINE * (axis.count("\n") + sum(label.count("\n") + 1 for label in labels) + 1)
     with style():
-        figure, (axes,) = stacked([title], [height_of(rows)], footer_of(axis, labels))
-        draw_rows_of_dots(axes, rows)
+        figure, (axes,) = stacked([title], [height], footer)
+        _dots(axes, rows, names, score)
         axes.axvline(0, color="black", linewidth=1, zorder=1, label=labels[0])
         for value, label in zip(lines.values(), labels[1:], strict=True):
             axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
@@ -84,13 +104,38 @@ def caption(results: Results, condition: str) -> str:
 
 def _rows(results: Results, condition: str) -> Iterator[Row]:
     """A row for every method but the baseline; how many targets have no difference stands in its name."""
-    looked, score = looks(results.names), results.headline
+    looked = looks(results.names)
     for test in results.against_baseline if results.layout.baseline else ():
         if test.condition != condition or not test.estimate.n:
             continue
         name = results.layout.marked(test.second)
         if test.estimate.n < len(results.targets):
             name = f"{name}, {test.estimate.n} of {len(results.targets)} targets"
-        yield Row(
-            name, test.differences, test.estimate, looked[test.second], score.estimate(test.estimate, signed=True)
+        yield Row(name, test.differences, test.estimate, looked[test.second])
+
+
+def _dots(axes: Axes, rows: Sequence[Row], names: Sequence[str], score: Score) -> None:
+    """Draw rows from above to below, with their names to the left and their numbers to the right of the axes."""
+    for height, row in enumerate(rows):
+        offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
+        size = DOT if len(row.values) > FEW else 2 * DOT
+        axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
+        mean, low, high = row.estimate.mean, row.estimate.low, row.estimate.high
+        reach = np.nan_to_num([[mean - low], [high - mean]])
+        axes.errorbar(mean, height, xerr=reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4)
+        axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
+        axes.annotate(
+            score.estimate(row.estimate, signed=True),
+            (1, height),
+            (6, 0),
+            xycoords=axes.get_yaxis_transform(),
+            textcoords="offset points",
+            va="center",
+            fontsize=medium().note,
+            annotation_clip=False,
         )
+    axes.set_yticks(range(len(rows)), names, parse_math=False, fontsize=medium().note)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    grid(axes, "x")

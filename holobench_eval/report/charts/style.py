@@ -11,7 +11,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 import matplotlib
@@ -20,10 +20,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from numpy.typing import NDArray
 from PIL import Image
 
 from .look.medium import DPI, medium
+from .look.methods import Look
 
 QUALITIES = range(90, 20, -5)  # of a JPEG: the first that is small enough
 LARGEST = 130_000  # bytes of a page of pictures
@@ -63,15 +65,27 @@ def new_figure(width: int, height: int) -> Figure:
     return figure
 
 
+def laid_out(width: int, height: int, rows: int = 1, columns: int = 1, **more: Any) -> tuple[Figure, NDArray[Any]]:
+    """A figure of ``rows`` x ``columns`` panels with room for all words; more: as of ``Figure.subplots``."""
+    figure = new_figure(width, height)
+    figure.set_layout_engine("constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **more)
+
+
 def stacked(titles: Sequence[str], heights: Sequence[int], footer: int) -> tuple[Figure, list[Axes]]:
     """A column of panels with their titles; ``heights`` and ``footer`` in pixels of the screen."""
     ratios = list(heights) if len(set(heights)) > 1 else None
-    figure = new_figure(medium().width, round(medium().scale * (sum(heights) + footer)))
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(len(titles), 1, squeeze=False, height_ratios=ratios)[:, 0]
-    for axes, title in zip(panels, titles, strict=True):
+    height = round(medium().scale * (sum(heights) + footer))
+    figure, panels = laid_out(medium().width, height, len(titles), height_ratios=ratios)
+    for axes, title in zip(panels[:, 0], titles, strict=True):
         axes.set_title(title, loc="left", weight="bold", parse_math=False)
-    return figure, list(panels)
+    return figure, list(panels[:, 0])
+
+
+def marks(look: Look, size: float) -> dict[str, Any]:
+    """How the marks of a method are plotted. size: on the screen [pt]."""
+    edge, scaled = look.colour, size * medium().scale ** 2
+    return {"marker": look.marker, "markersize": scaled, "markerfacecolor": look.face, "markeredgecolor": edge}
 
 
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
@@ -84,7 +98,11 @@ def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str
     """A legend below all panels, with as many columns as the names leave room for."""
     room = medium().characters(medium().width) // (max(map(len, labels)) + 8)
     columns = max(1, min(room, len(labels)))
-    legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+    without_math(figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False))
+
+
+def without_math(legend: Legend) -> None:
+    """Show names as they are, dollar signs in them too."""
     for text in legend.get_texts():
         text.set_parse_math(False)
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from .cost import legend
 from .look.medium import medium
 from .look.methods import Look
-from .style import GREY, grid, save, stacked, style
+from .style import GREY, grid, marks, save, stacked, style
 
 PANEL, FOOTER = 330, 10
 
@@ -67,10 +67,7 @@ def _draw_curves(axes: Axes, panel: Panel) -> None:
             curve.mean,
             yerr=np.nan_to_num(np.array(curve.reach).T),
             color=curve.look.colour,
-            marker=curve.look.marker,
-            markersize=6.5 * medium().scale ** 2,
-            markerfacecolor=curve.look.face,
-            markeredgecolor=curve.look.colour,
+            **marks(curve.look, 6.5),
             linewidth=1.5 if panel.ticks is None else 0,
             linestyle="--" if curve.dashed else "-",
             elinewidth=0.8,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from ...study.artifacts import Round
 from .look.medium import medium
-from .style import SHADES, grid, legend_below, new_figure, save, style
+from .style import SHADES, grid, laid_out, legend_below, save, style
 
 Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
+Limits = tuple[tuple[float, float], tuple[float, float]]  # of captures, and of PSNR [dB]
 
 COLUMNS = 3
 A_PAGE = 6
@@ -48,30 +48,22 @@ def _has_figures(step: Round) -> bool:
     return math.isfinite(step.captures) and any(math.isfinite(getattr(step, name)) for name, *_ in LINES)
 
 
-@dataclass(frozen=True)
-class _Limits:
+def _limits(trainings: Sequence[Rounds]) -> Limits:
     """The ranges of captures and of PSNR, one for all panels, so that they can be compared by eye."""
-
-    captures: tuple[float, float]
-    psnr: tuple[float, float]
-
-
-def _limits(trainings: Sequence[Rounds]) -> _Limits:
     values = np.array([getattr(step, name) for _, rounds in trainings for step in rounds for name, *_ in LINES])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     margin = max(0.5, 0.08 * (high - low))
     most = max(step.captures for _, rounds in trainings for step in rounds)
-    return _Limits((0.0, most * 1.06 + 0.5), (low - margin, high + margin))
+    return (0.0, most * 1.06 + 0.5), (low - margin, high + margin)
 
 
-def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
+def curves(path: Path, trainings: Sequence[Rounds], limits: Limits) -> None:
     """A panel per training: the three figures against the captures taken, a mark per round."""
     columns = min(COLUMNS, len(trainings), medium().width // NARROWEST)
     rows = -(-len(trainings) // columns)
     with style():
-        figure = new_figure(medium().width, round(medium().scale * (60 + 270 * rows)))
-        figure.set_layout_engine("constrained")
-        panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
+        height = round(medium().scale * (60 + 270 * rows))
+        figure, panels = laid_out(medium().width, height, rows, columns, sharey=True)
         for index, axes in enumerate(panels.flat):
             if index >= len(trainings):
                 axes.remove()
@@ -92,12 +84,10 @@ def curves(path: Path, trainings: Sequence[Rounds], limits: _Limits) -> None:
         save(figure, path)
 
 
-def _curve(axes: Axes, rounds: tuple[Round, ...], limits: _Limits) -> None:
+def _curve(axes: Axes, rounds: tuple[Round, ...], limits: Limits) -> None:
     captures = [step.captures for step in rounds]
     for key, label, colour, marker in LINES:
         axes.plot(captures, [getattr(step, key) for step in rounds], color=colour, marker=marker, label=label)
-    axes.set_xlabel("captures taken for training")
-    axes.set_xlim(*limits.captures)
-    axes.set_ylim(*limits.psnr)
+    axes.set(xlabel="captures taken for training", xlim=limits[0], ylim=limits[1])
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     grid(axes)

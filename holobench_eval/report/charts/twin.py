@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...optics.colour import srgb_encode
 from .look.medium import medium
 from .look.methods import Look
-from .style import GREY, PALE, grid, new_figure, save, save_picture, style
+from .style import GREY, PALE, grid, laid_out, save, save_picture, style, without_math
 
 SIDE, FRAME = 250, 90  # pixels: of a picture, around all
 LOUDER = 4.0  # factor of differences
@@ -28,9 +28,8 @@ def draw_twin_pictures(path: Path, rows: Mapping[str, tuple[Picture, Picture, Pi
         f"of two photographs, x {LOUDER:g}",
     )  # fmt: skip
     with style():
-        figure = new_figure(SIDE * len(titles) + FRAME, SIDE * len(rows) + FRAME)
-        figure.set_layout_engine("constrained")
-        panels = figure.subplots(len(rows), len(titles), squeeze=False)
+        width, height = (SIDE * len(each) + FRAME for each in (titles, rows))
+        figure, panels = laid_out(width, height, len(rows), len(titles))
         for line, (label, (first, second, twin)) in zip(panels, rows.items(), strict=True):
             shown = (first, twin, LOUDER * np.abs(twin - first), LOUDER * np.abs(second - first))
             for axes, title, picture in zip(line, titles, shown, strict=True):
@@ -49,10 +48,8 @@ def _show(axes: Axes, picture: Picture) -> None:
     light = srgb_encode(torch.from_numpy(np.clip(picture, 0, 1))).numpy()
     image = np.moveaxis(np.repeat(light, 3, 0) if len(light) == 1 else light, 0, -1)
     axes.imshow(image, interpolation="nearest")
-    axes.set_xticks([])
-    axes.set_yticks([])
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
 
 
 def draw_twin_scores(
@@ -65,9 +62,7 @@ def draw_twin_scores(
     """Draw the score of each picture on the twin over that on the display, a colour a method; of ``others`` pale."""
     with style():
         side = round(medium().scale * 480)
-        figure = new_figure(round(1.45 * side), side)
-        figure.set_layout_engine("constrained")
-        axes = figure.subplots()
+        figure, ((axes,),) = laid_out(round(1.45 * side), side)
         every = np.concatenate([*display.values(), *twin.values()])
         ends = np.array([every.min() - 0.5, every.max() + 0.5])
         axes.plot(ends, ends, color=GREY, linewidth=0.8, label="as on the display")
@@ -80,13 +75,8 @@ def draw_twin_scores(
             axes.scatter(
                 display[label], scores, s=34, marker=own.marker, facecolor=own.face, edgecolor=own.colour, label=label
             )
-        axes.set_xlim(*ends)
-        axes.set_ylim(*ends)
-        axes.set_aspect("equal")
-        axes.set_xlabel("PSNR on the display [dB]")
-        axes.set_ylabel("PSNR on the twin [dB]")
+        axes.set(xlim=ends, ylim=ends, aspect="equal")
+        axes.set(xlabel="PSNR on the display [dB]", ylabel="PSNR on the twin [dB]")
         grid(axes)
-        legend = axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
+        without_math(axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False))
         save(figure, path)

@@ -20,7 +20,7 @@ from .phrases import marks, tested, verdict
 from .results import CONSTANT, Results
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
-from .tables import rounded
+from .tables import to_json
 
 # In the order of the board.
 GROUPS = {
@@ -91,7 +91,7 @@ class Board:
             "displays": [
                 {
                     "name": display.name,
-                    "floor": _number(display.floor),
+                    "floor": to_json(display.floor),
                     "groups": [
                         {"name": GROUPS[group], "rows": [self._row(row) for row in rows]}
                         for group, rows in display.groups
@@ -109,11 +109,11 @@ class Board:
             "tier": row.tier,
             "targets": row.scored,
             "score": _ends(row.score),
-            "difference": _ends(row.test.estimate) | {"p": _number(row.test.p)} if row.test else None,
+            "difference": _ends(row.test.estimate) | {"p": to_json(row.test.p)} if row.test else None,
             "verdict": verdict(self.results.headline, row.test) if row.test else None,
-            "beside": {score.key: _number(value) for score, value in zip(self.beside, row.beside, strict=True)},
-            "photographs": _number(row.photographs),
-            "seconds": _number(row.seconds),
+            "beside": {score.key: to_json(value) for score, value in zip(self.beside, row.beside, strict=True)},
+            "photographs": to_json(row.photographs),
+            "seconds": to_json(row.seconds),
             "marks": list(row.marks),
         }
 
@@ -180,8 +180,4 @@ def _mean(results: Results, label: str, condition: str) -> float:
 
 
 def _ends(estimate: Estimate) -> dict[str, float | None]:
-    return {"mean": _number(estimate.mean), "low": _number(estimate.low), "high": _number(estimate.high)}
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else rounded(value)
+    return {"mean": to_json(estimate.mean), "low": to_json(estimate.low), "high": to_json(estimate.high)}

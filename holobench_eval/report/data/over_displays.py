@@ -9,9 +9,8 @@ import numpy as np
 
 from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
-from .causes import FEWEST_DISPLAYS
 from .results import Results
-from .statistics import Array, Estimate, two_way
+from .statistics import FEWEST_DISPLAYS, Array, Estimate, two_way
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
 from .categories import OFFLINE
-from .causes import Cause, cause
 from .layout import Swept
 from .results import Results
-from .statistics import Array, Estimate, mean_interval
+from .statistics import Array, Cause, Estimate, cause, mean_interval
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
@@ -135,11 +134,6 @@ class Ranks:
         """Their mean, and its interval over draws."""
         found = mean_interval(self.taus)
         return replace(found, high=min(found.high, 1.0))  # no correlation is larger
-
-    @property
-    def unchanged(self) -> int:
-        """Draws in which every method has its nominal place."""
-        return int((self.positions == self.nominal_positions).all(axis=1).sum())
 
     @cached_property
     def features(self) -> dict[str, Array]:

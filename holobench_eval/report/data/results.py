@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.errors import UserError, suggest
 from ...metrics import control
 from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
-from .categories import CATEGORIES, FLOOR, OFFLINE, ORACLE
+from .categories import FLOOR, OFFLINE, ORACLE
 from .layout import Layout
 from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, family_p, mean_interval
@@ -111,6 +111,11 @@ class Results:
         names = dict.fromkeys(self.table["condition"])
         return [name for name in names if not is_reference(name) and name not in self.layout.changed]
 
+    @cached_property
+    def changed(self) -> list[str]:
+        """Conditions that are a change of another, in the order of the table."""
+        return [name for name in dict.fromkeys(self.table["condition"]) if name in self.layout.changed]
+
     def methods(self, condition: str) -> list[str]:
         """Labels with a row under ``condition``, in the order of the table."""
         return [label for label, name in self._rows if name == condition]
@@ -152,12 +157,6 @@ class Results:
         labels = [label for label in self.methods(condition) if self.layout.category(label) in categories]
         complete = [label for label in labels if self.is_complete(label, condition, key)]
         return sorted(complete, key=lambda label: -score.sign * self.values(label, condition, key).mean())
-
-    @cached_property
-    def categories(self) -> list[str]:
-        """The categories that have rows, in their order."""
-        present = {self.layout.category(label) for condition in self.conditions for label in self.methods(condition)}
-        return [category for category in CATEGORIES if category in present]
 
     def oracle(self, condition: str) -> str | None:
         """The best complete privileged method."""

@@ -24,6 +24,10 @@ class Sweep:
         """What changes."""
         return KINDS[self.swept.kind]
 
+    def text(self, value: float | str) -> str:
+        """A value with its unit, as in a config; names have none."""
+        return f"{f'{value:g}' if isinstance(value, float) else value} {self.kind.unit}".strip()
+
     @property
     def points(self) -> tuple[tuple[float | str, str], ...]:
         """(value, condition), by value, the unchanged display at its place; it leads as ``before`` where the values are

@@ -8,6 +8,7 @@ the same bytes.
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
@@ -39,6 +40,11 @@ GUARDED = rf"^'({_FORMULA.pattern})"
 def rounded(value: Any) -> float:
     """The number as the CSV files have it, with six significant digits; NaN for None."""
     return float("nan") if value is None else float(f"{float(value):.6g}")
+
+
+def to_json(value: float | None) -> float | None:
+    """The number as JSON files have it; None for NaN, which JSON has not."""
+    return None if value is None or math.isnan(value) else rounded(value)
 
 
 def _row(record: Record, layout: Layout, listed: Sequence[Column]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from ..data.phrases import counted, tested, verdict
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
+from ..data.tables import to_json
 from ..data.text import number, p_value
 from ..section import Report
 
@@ -26,16 +27,15 @@ TIER, GAIN, P = "tier", "gain", "p"
 def page_data(report: Report) -> Json:
     """Everything that the page draws, ready for JSON: no NaN, and numbers rounded as in table.csv."""
     results, text = report.results, report.results.layout.text
-    changed = [name for name in dict.fromkeys(results.table["condition"]) if name in results.layout.changed]
     tiers = {display.name: {row.label: row.tier for row in display.rows} for display in board(results).displays}
-    tiers |= {name: dict.fromkeys(results.methods(name), "") for name in changed}
+    tiers |= {name: dict.fromkeys(results.methods(name), "") for name in results.changed}
     colours = looks(results.names)
     return {
         "headline": _score(results.headline),
         "baseline": results.layout.baseline,
         "words": {"scored": text.scored, "truth": text.truth},
         "displays": results.conditions,
-        "changed": changed,
+        "changed": results.changed,
         "columns": list(_columns(results)),
         "scores": [_score(score) for score in results.leading],
         "methods": {
@@ -56,7 +56,10 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {"name": text.floor_name(floor), "mean": _number(results.row(floor, results.reference(name))[column])}
+                {
+                    "name": text.floor_name(floor),
+                    "mean": to_json(results.row(floor, results.reference(name))[column]),
+                }
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
@@ -115,18 +118,13 @@ def _estimate(score: Score, estimate: Estimate, signed: bool = False) -> Json:
 
 
 def _cell(text: str, value: float, low: float = math.nan, high: float = math.nan) -> Json:
-    ends = {} if math.isnan(low) else {"low": _number(low), "high": _number(high)}
-    return {"text": text, "value": _number(value), **ends}
+    ends = {} if math.isnan(low) else {"low": to_json(low), "high": to_json(high)}
+    return {"text": text, "value": to_json(value), **ends}
 
 
 def _by_target(results: Results, label: str, condition: str) -> Json:
     """By score, the value of every target in their order; null for a hole."""
     return {
-        score.key: [_number(value) for value in results.values(label, condition, score.key)]
+        score.key: [to_json(value) for value in results.values(label, condition, score.key)]
         for score in results.leading
     }
-
-
-def _number(value: float) -> float | None:
-    """Six significant digits, as in table.csv; None for NaN, which JSON has not."""
-    return None if math.isnan(value) else float(f"{value:.6g}")

@@ -26,7 +26,7 @@ from ..markdown import FIGURE, blocks
 from ..section import Report
 from ..sections import sections
 from ..sections.answer import counts
-from ..sections.appendix import environment
+from ..sections.setup import environment
 from .data import page_data
 from .pictures import pictures
 

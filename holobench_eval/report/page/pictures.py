@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from PIL import Image
+
+from ...core.io import write_atomically
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.gallery import spread
+from ..data.results import Results
 from ..section import Report
 from .data import Json
 
 TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit
 
 Cell = tuple[str, str, str]  # method, condition, target; a target itself has neither method nor condition
+MOST_BYTES = 3_000_000  # of all pictures of a report
+QUALITY = 85  # of WebP, 0 to 100: a sixth of the bytes of PNG
+MARK, SAYS = "README.md", b"Small copies of the pictures of the report beside this folder, written with it.\n"
 
 
 @dataclass
@@ -59,7 +67,8 @@ def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
 
 
 def _numbers(report: Report, found: Pictures) -> Json:
-    results, displays, number = report.results, [*_pictured(report), *_changed(report)], found.numbers.get
+    results, number = report.results, found.numbers.get
+    displays = _pictured(results, [*results.conditions, *results.changed])
     targets, held = results.targets, Counter(target for *_, target in found.numbers)
     return {
         "targets": {name: [number(("", results.reference(name), target)) for target in targets] for name in displays},
@@ -91,18 +100,17 @@ def _note(report: Report, held: int, there: int) -> str:
 
 def groups(report: Report) -> Iterator[list[Cell]]:
     """The pictures that answer most, first things first: see ``pictures``."""
-    results, conditions = report.results, _pictured(report)
+    results, conditions = report.results, _pictured(report.results, report.results.conditions)
     if not conditions:
         return
-    ordered = report.thumbnails.by_quality(conditions[0])
-    first = spread(ordered, TARGETS_IN_FULL) if len(ordered) > TARGETS_IN_FULL else ordered
+    first = spread(report.thumbnails.by_quality(conditions[0]), TARGETS_IN_FULL)
     for target in first:
         cells = ((label, name, target) for name in conditions for label in results.methods(name))
         yield [*_truths(report, target), *cells]
     for target in results.targets:
         yield [*_truths(report, target), *_roles(report, conditions, target)]
     for target in first:
-        yield list(_roles(report, _changed(report), target))
+        yield list(_roles(report, _pictured(results, results.changed), target))
 
 
 def _truths(report: Report, target: str) -> list[Cell]:
@@ -122,18 +130,13 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
 def planned(report: Report) -> Iterator[Cell]:
     """The captures that a report could show."""
     results = report.results
-    for condition, target in itertools.product([*_pictured(report), *_changed(report)], results.targets):
+    shown = _pictured(results, [*results.conditions, *results.changed])
+    for condition, target in itertools.product(shown, results.targets):
         yield from ((label, condition, target) for label in results.methods(condition))
 
 
-def _pictured(report: Report) -> list[str]:
-    return [name for name in report.results.conditions if report.results.has_pictures(name)]
-
-
-def _changed(report: Report) -> list[str]:
-    """Conditions that are a change of another, in the order of the table."""
-    names = dict.fromkeys(report.results.table["condition"])
-    return [name for name in names if name in report.layout.changed and report.results.has_pictures(name)]
+def _pictured(results: Results, conditions: Iterable[str]) -> list[str]:
+    return [name for name in conditions if results.has_pictures(name)]
 
 
 def files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
@@ -146,3 +149,41 @@ def files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
     shape = report.results.shape
     targets = {cell: thumbnails.of_target(cell[2], shape(cell[1])) for cell in truths}
     return {cell: path for cell, path in (targets | paths).items() if path.is_file()}
+
+
+def keep_copies(report: Report) -> None:
+    """Copy the thumbnails that answer most into ``pictures``, as WebP; those of an earlier run go.
+
+    Nothing changes where a report is written again without its records, nor in a folder that is somebody else's.
+    """
+    folder = report.thumbnails.copies
+    is_ours = not folder.exists() or ((folder / MARK).is_file() and (folder / MARK).read_bytes() == SAYS)
+    if not report.thumbnails.store.folder.is_dir() or not is_ours:
+        return
+    known, kept, room = files(report, planned(report)), dict[str, bytes](), MOST_BYTES
+    by_target = ([cell for cell in known if cell[2] == target] for target in report.results.targets)
+    for group in [*groups(report), *by_target]:
+        paths = {path.stem: path for cell in group if (path := known.get(cell)) and path.stem not in kept}
+        new = {stem: content for stem, path in paths.items() if (content := _encoded(path))}
+        if (size := sum(map(len, new.values()))) <= room:
+            kept, room = kept | new, room - size
+    if kept:
+        write_atomically(folder / MARK, SAYS)
+    for old in folder.glob("*.webp"):
+        if old.stem not in kept:
+            old.unlink()
+    for stem, content in kept.items():
+        write_atomically(folder / f"{stem}.webp", content)
+
+
+def _encoded(path: Path) -> bytes:
+    """A picture as WebP; a copy as it is, and nothing of a damaged file."""
+    if path.suffix == ".webp":
+        return path.read_bytes()
+    encoded = io.BytesIO()
+    try:
+        with Image.open(path) as picture:
+            picture.save(encoded, "WEBP", quality=QUALITY)
+    except (OSError, ValueError, Image.DecompressionBombError):
+        return b""
+    return encoded.getvalue()

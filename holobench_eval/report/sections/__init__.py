@@ -9,9 +9,7 @@ from ..section import Section
 NAMES = (
     "answer",
     "overview",
-    "error_budget",
     "setup",
-    "cost",
     "sweeps",
     "ranks",
     "focus",
@@ -19,7 +17,6 @@ NAMES = (
     "diagnosis",
     "tests",
     "alignment",
-    "appendix",
 )
 
 

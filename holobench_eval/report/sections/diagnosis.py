@@ -98,21 +98,18 @@ def quantities(rows: Sequence[Row]) -> Markdown:
         first = next(iter(same.values()))
         words = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
         off = [abs(difference(row)) for row in same.values() if _known(row.get("truth")) and row.get("seen", True)]
+        stated = f"{first['error']:.2g}" if _known(first.get("error")) else "–"
         lines.append(
             [
                 words,
                 first.get("unit") or "",
                 *(_cell(same[colour], told) if colour in same else "" for colour in columns),
                 f"{max(off):.3f}" if off else "–",
-                "not seen" if first.get("seen") is False else _stated(first),
+                "not seen" if first.get("seen") is False else stated,
             ]
         )
     heads = [_colour(colour) for colour in columns]
     return table(["quantity", "unit", *heads, "largest difference", "stated error"], lines)
-
-
-def _stated(row: Row) -> str:
-    return f"{row['error']:.2g}" if _known(row.get("error")) else "–"
 
 
 def _colour(colour: int | None) -> str:

@@ -7,15 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from ..answers import kind_of
+from ..answers import budget, kind_of
 from ..answers.kind import subjects
 from ..charts import paired
+from ..charts.cost import draw_costs
+from ..charts.error_budget import draw_budgets
 from ..charts.family import draw_map
 from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..data import over_displays
 from ..data.board import board
 from ..data.display_map import display_map
+from ..data.error_budget import budgets
+from ..data.over_displays import is_many
 from ..data.results import Results
 from ..section import Blocks, Figures, Report, Section
 
@@ -111,6 +115,41 @@ def _has_scores(report: Report) -> bool:
     return bool(report.results.conditions) and values is not None and bool(np.isfinite(values).any())
 
 
+def _budgets(report: Report) -> Iterator[tuple[Path, str]]:
+    """Where the error of captures comes from."""
+    if found := budgets(report.results):
+        path = report.figures / "error-budget.png"
+        draw_budgets(path, found)
+        yield (
+            path,
+            "The error budget. Left: parts of the squared error of the captures, by display, with their PSNR. Right: "
+            "what removing a part and all parts to its left would gain at most, with its 95 % interval over clusters; "
+            "for temporal noise, what captures with no other error would gain.",
+        )
+
+
+def _spends(results: Results) -> bool:
+    known = results.layout.spends_captures and not results.layout.predicts and "total_captures" in results.table
+    return known and not is_many(results) and bool((results.table["total_captures"] > 0).any())
+
+
+def _is_budget(report: Report) -> bool:
+    return _spends(report.results) and kind_of(report.results) is budget.KIND
+
+
+def _costs(report: Report) -> Iterator[tuple[Path, str]]:
+    """Quality against the photographs that it cost."""
+    results, path = report.results, report.figures / "quality-captures.png"
+    axis = f"{results.headline.axis}{results.layout.text.axis}"
+    displays = [each for each in board(results).displays if any(row.photographs for row in each.rows)]
+    draw_costs(path, displays, results.names, looks(results.names), axis)
+    yield (
+        path,
+        f"{axis}, against all photographs of a row: those of its training once, and those of every target. Lines join "
+        "the rows of a method. Bars: 95 % interval of the difference to the baseline.",
+    )
+
+
 SECTIONS = (
     Section("overview", 3, _table, applies=_has_scores),
     Section(
@@ -119,6 +158,7 @@ SECTIONS = (
         applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget",
         figures=_plot,
     ),
+    Section("error budget", 5, figures=_budgets),
     Section(
         "pictures",
         6,
@@ -127,4 +167,12 @@ SECTIONS = (
     ),
     Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
     Section("stages", 90, figures=_stages, details=True),
+    Section("budget, drawn", 44, applies=_is_budget, figures=_costs),
+    Section(
+        "cost",
+        40,
+        applies=lambda report: _spends(report.results) and not _is_budget(report) and not report.results.done.empty,
+        figures=_costs,
+        details=True,
+    ),
 )

@@ -8,9 +8,8 @@ from pathlib import Path
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
-from ..data.causes import CLEAR
 from ..data.ranks import CIRCULAR, Pair, Ranks
-from ..data.statistics import mean_interval
+from ..data.statistics import CLEAR, mean_interval
 from ..data.text import percent, words
 from ..markdown import Markdown, bullets, heading, table
 from ..section import Blocks, Figures, Report, Section

@@ -10,7 +10,7 @@ from ..data.categories import FLOOR
 from ..data.layout import TrainingSet
 from ..data.results import Results
 from ..data.text import FILES, plain
-from ..markdown import Markdown, blocks, bullets, code, heading, properties, table
+from ..markdown import Markdown, blocks, bullets, code, code_block, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
 from .alignment import agreement
 
@@ -139,8 +139,27 @@ def _limit(cell: Mapping[str, Any]) -> str:
     return f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
 
 
+def _environment(report: Report, _: Figures) -> Blocks:
+    description = report.description
+    yield heading("Config and environment")
+    if description.config_text:
+        yield Markdown("The config, {}:").format(code(description.config_file))
+        yield code_block(description.config_text)
+    rows = environment(report.provenance)
+    yield properties(rows) if rows else "The environment was not recorded."
+
+
+def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the run used, as far as it is the same for two equal runs: no times, no paths, no revisions."""
+    single = {"package": "holobench_eval", "python": "Python", "platform": "platform", "cpu": "processor", "gpu": "GPU"}
+    numbers = {"threads": "threads per worker", "workers": "workers", "config_sha256": "sha256 of the config"}
+    named = [(title, str(provenance[key])) for key, title in (single | numbers).items() if key in provenance]
+    return [*named, *((name, str(value)) for name, value in provenance.get("packages", {}).items())]
+
+
 SECTIONS = (
     Section("details", 1, lambda report, _: [_details_of(report)], details=True),
     Section("setup", 10, _setup, details=True),
     Section("displays and methods", 20, _described, lambda report: report.layout.measure != FILES, details=True),
+    Section("environment", 220, _environment, details=True),
 )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
+from ..charts.gallery import spread
 from ..charts.look.methods import looks
 from ..charts.rows import Row, draw_rows
 from ..charts.sweeps import Curve, Panel, draw_sweep
@@ -17,16 +16,6 @@ from ..section import Report, Section
 
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
 MOST_ROWS = 4
-
-
-def value_text(value: float | str) -> str:
-    """A value as in a config."""
-    return f"{value:g}" if isinstance(value, float) else value
-
-
-def _with_unit(sweep: Sweep, value: float | str) -> str:
-    unit = f" {sweep.kind.unit}" if sweep.kind.unit and value != "before" else ""
-    return f"{value_text(value)}{unit}"
 
 
 def _by_kind(report: Report) -> list[list[Sweep]]:
@@ -83,7 +72,7 @@ def _panel(sweep: Sweep) -> Panel:
         axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
         positions=tuple(float(value) if kind.numeric else float(index) for index, (value, _) in enumerate(points)),
         curves=tuple(curves),
-        ticks=None if kind.numeric else tuple(value_text(value) for value, _ in points),
+        ticks=None if kind.numeric else tuple(sweep.text(value) for value, _ in points),
         nominal=kind.nominal,
         floor=float(results.row(CONSTANT, results.reference(before))[results.headline.column]) if has_floor else None,
     )
@@ -100,15 +89,9 @@ def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
 
 def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:
     """A row of captures for each of the chosen methods."""
-    points = sweep.points
-    if len(points) > MOST_VALUES:
-        picks = np.linspace(0, len(points) - 1, MOST_VALUES).round().astype(int)
-        points = tuple(points[index] for index in picks)
+    points, tile = spread(sweep.points, MOST_VALUES), report.thumbnails.tile
     return [
-        Row(
-            label,
-            tuple((_with_unit(sweep, value), report.thumbnails.tile(label, name, target)) for value, name in points),
-        )
+        Row(label, tuple((sweep.text(value), tile(label, name, target)) for value, name in points))
         for label in _chosen(sweep)
     ]
 

@@ -248,7 +248,8 @@ class Scoring:
             clipped = f"{saturated:.2%} of the scored samples are clipped, more than {MOST_SATURATED:.1%}"
             return self.failed(cell, f"the capture is over-exposed: {clipped}")
         del raw
-        frame, compared = self.capture_values(capture), torch.from_numpy(self.target_values(target))
+        frame = self.target_values(capture) if self.values == "srgb" else capture
+        compared = torch.from_numpy(self.target_values(target))
         figures = self.second(frame, compared, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
         image, reference = torch.from_numpy(sampled(frame, warp)).double(), compared.double()
@@ -328,10 +329,6 @@ class Scoring:
     def target_values(self, target: Values) -> Values:
         """A target in the values that are compared."""
         return target if self.values == "stored" else srgb_decode(torch.from_numpy(target)).numpy()
-
-    def capture_values(self, capture: Values) -> Values:
-        """A capture in the values that are compared."""
-        return self.target_values(capture) if self.values == "srgb" else capture
 
     def as_light(self, compared: Tensor) -> Tensor:
         """Linear light of values that are compared, for thumbnails, which are sRGB, and for the second aligner."""

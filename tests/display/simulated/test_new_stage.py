@@ -75,7 +75,7 @@ def test_a_stage_is_one_file_and_one_field(tmp_path: Path) -> None:
     folder = package / "display" / "simulated"
     (folder / "stages" / "neutral_density.py").write_text(STAGE)
     text = (folder / "profile.py").read_text()
-    for before, line in (("from .stage import", IMPORT), ("    relay: Relay", FIELD)):
+    for before, line in (("from .stage import", IMPORT), ("    relay: kinds.Relay", FIELD)):
         assert before in text
         text = text.replace(before, line + before, 1)
     (folder / "profile.py").write_text(text)

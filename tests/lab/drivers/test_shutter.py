@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from holobench_eval.lab.drivers.shutter import exact, nearest, seconds, speeds
+from holobench_eval.lab.drivers.gphoto2_camera import exact, nearest, seconds, speeds
 
 THIRDS = "30 25 20 15 13 10 8 6 5 4 3.2 2.5 2 1.6 1.3 1 0.8 0.6 0.5 0.4 0.3 1/4 1/5 1/6 1/8 1/10 1/13 1/15 1/20 1/25 1/30 1/40 1/50 1/60 1/80 1/100 1/125 1/160 1/200 1/250 1/320 1/400 1/500 1/640 1/800 1/1000 1/4000"  # noqa: E501
 HALVES = "30 20 15 10 8 6 4 3 2 1.5 1 0.7 0.5 0.3 1/4 1/6 1/8 1/10 1/15 1/20 1/30 1/45 1/60 1/90 1/125 1/180 1/250 1/350 1/500"  # noqa: E501

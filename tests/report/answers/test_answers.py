@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.answers import KINDS, ablation, budget, comparison, error_budget, kind_of, learned_display
+from holobench_eval.report.answers import KINDS, ablation, budget, comparison, error_budget, kind_of
 from holobench_eval.report.answers import focus as focus_kind
 from holobench_eval.report.answers import prediction as prediction_kind
 from holobench_eval.report.answers import ranks as ranks_kind
@@ -250,7 +250,7 @@ def test_control_is_told_beside_predictions_and_of_the_models_of_an_error_budget
 
 def test_a_learned_display_has_a_question_of_its_own() -> None:
     found = results_of({"old": 17.0, "new": 19.0}, learned_display="bench")
-    assert kind_of(found) is learned_display.KIND
+    assert kind_of(found) is comparison.ON_A_NETWORK
 
 
 def sweep(**changes: Any) -> Results:

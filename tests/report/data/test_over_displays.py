@@ -7,8 +7,8 @@ import numpy as np
 from holobench_eval.display import load_profile
 from holobench_eval.report.answers import kind_of, over_displays
 from holobench_eval.report.charts.paired import draw_over_displays
-from holobench_eval.report.data.causes import FEWEST_DISPLAYS, cause
 from holobench_eval.report.data.over_displays import margins, parameters, shown_on
+from holobench_eval.report.data.statistics import FEWEST_DISPLAYS, cause
 from tests.report.answers.test_answers import NOISE, results_of
 
 DISPLAYS = [f"leto-2020-{number:02d}" for number in range(1, 11)]

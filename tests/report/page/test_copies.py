@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from holobench_eval.report import Description, Results, records_frame
-from holobench_eval.report.page import copies as module
-from holobench_eval.report.page.copies import keep_copies
-from holobench_eval.report.page.pictures import pictures
+from holobench_eval.report.page import pictures as module
+from holobench_eval.report.page.pictures import keep_copies, pictures
 from holobench_eval.report.section import Report
 from tests.support import synthetic_study as synthetic
 

@@ -3,7 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from holobench_eval.report import Description, write_report
-from holobench_eval.report.charts.error_budget import draw_budgets
 from tests.report.data.test_error_budget import LEFT, METHODS, record, results
 
 
@@ -12,8 +11,3 @@ def test_a_report_has_the_figure_and_the_parts_of_the_budget_on_its_first_page(t
     text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
     assert text.index("## Answer") < text.index("| temporal noise |") < text.index("(figures/error-budget.png)")
     assert (tmp_path / "figures" / "error-budget.png").is_file()
-
-
-def test_nothing_is_drawn_without_a_budget(tmp_path: Path) -> None:
-    draw_budgets(tmp_path / "none.png", [])
-    assert not (tmp_path / "none.png").exists()
