@@ -118,7 +118,8 @@ def save_levels(phase: Numbers, path: str | Path, **convention: Any) -> Path:
     phase
         ``(C, H, W)`` [rad], C = 1 or 3: ``phase[:1]`` is the first colour alone.
     path
-        Of the picture, which ends in .png. ``display.solve("phases", target, file=path)`` reads it back.
+        Of the picture, which ends in .png. Its folder is made where there is none.
+        ``display.solve("phases", target, file=path)`` reads it back.
     **convention
         What the levels mean, by the keys of ``phase`` in the file of a bench: ``two_pi_level`` (256 unless given; a
         list has one for each colour), ``sign``, ``origin``, ``correction``, ``flip_horizontal``, ``flip_vertical``.
@@ -162,7 +163,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     captures
         ``(C, h, w)`` linear light as floating point, by the names of their columns.
     path
-        Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg.
+        Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg. Its folder is made where there is none.
 
     Returns
     -------
