@@ -24,6 +24,7 @@ from ..metrics import score as _score
 from ..optics.colour import srgb_encode
 from ..study.folders.doubts import LIFTED
 from ..study.folders.exposure import darkest
+from ..study.folders.pairing import exchange
 from .described import Scores, refuse_swapped
 from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of
 
@@ -82,6 +83,8 @@ def score(
     if darkest(light, wanted) < -LIFTED:
         text = f"the capture is darker than the target where it is darkest, by more than {LIFTED:.0%} of its white"
         warnings.warn(f"{text}: dark counts that are too high do that", stacklevel=2)
+    if swapped := exchange(light, wanted):
+        warnings.warn(swapped, stacklevel=2)
     return Scores(found)
 
 
