@@ -204,10 +204,12 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
         note = f"PSNR {scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
         columns.append(Column(name, (Tile(shown, note),)))
         errors.append(error_map(shown, truth))
-    place.parent.mkdir(parents=True, exist_ok=True)
-    draw_comparison(
-        place, "captures, each at the brightness that fits best", [("", truth)], columns, error_limit(errors)
-    )
+    title = "captures, each at the brightness that fits best"
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        draw_comparison(place, title, [("", truth)], columns, error_limit(errors))
+    except OSError as error:
+        raise UserError(f"path: '{path}' cannot be written: {error.strerror or error}") from None
     return place
 
 

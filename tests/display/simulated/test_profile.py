@@ -137,9 +137,7 @@ def test_a_table_of_levels_in_another_unit_is_refused_with_its_factor(tmp_path, 
     if not says:
         assert max(load_profile("mine.yaml", tmp_path).panel.levels) > 0
         return
-    with pytest.raises(
-        UserError, match=rf"mine.yaml:3:\d+: the table spans .* turns; expected 20 to .*{says}"
-    ):
+    with pytest.raises(UserError, match=rf"mine.yaml:3:\d+: the table spans .* turns; expected 20 to .*{says}"):
         load_profile("mine.yaml", tmp_path)
 
 
