@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 from torch.nn.functional import adaptive_avg_pool2d
 
@@ -19,6 +20,7 @@ UNKNOWN = f"which gray picture was shown is not known; {SAVE_TARGET}"
 # ones (Stanford 2021) 0.88 to 0.93, and with red and blue exchanged the negative of that.
 EXCHANGED = -0.2
 COARSE = 36  # averages a side, in which speckle weighs little
+ALIKE = 0.25  # correlation of red and blue together, which an exchange leaves as it is
 COLOURFUL = 0.05  # of the mean of a channel: least contrast of red less blue in a target that can tell
 NEARLY = "whose channels differ by a few levels of 255, as those of a gray picture that was saved as a JPEG in colour"
 
@@ -119,11 +121,10 @@ def exchange(image: Tensor, reference: Tensor) -> str:
     """
     if len(image) != 3:
         return ""
-    seen, wanted = (_red_less_blue(each) for each in (image, reference))
-    if float(wanted.std()) < COLOURFUL or not float(seen.std()) > 0:
+    (seen, seen_sum), (wanted, wanted_sum) = (_of_red_and_blue(each) for each in (image, reference))
+    if float(wanted.std()) < COLOURFUL or _correlation(seen_sum, wanted_sum) < ALIKE:  # gray, or another picture
         return ""
-    correlation = float((seen * wanted).mean() / (seen.std(correction=0) * wanted.std(correction=0)))
-    if correlation >= EXCHANGED:
+    if (correlation := _correlation(seen, wanted)) >= EXCHANGED:
         return ""
     return (
         f"red and blue are exchanged in the capture or in its target (their difference correlates by {correlation:.2f})"
@@ -131,8 +132,13 @@ def exchange(image: Tensor, reference: Tensor) -> str:
     )
 
 
-def _red_less_blue(image: Tensor) -> Tensor:
-    """The difference of the outer channels ``(3, h, w)``, each over its mean, averaged over speckle; of mean zero."""
+def _of_red_and_blue(image: Tensor) -> tuple[Tensor, Tensor]:
+    """Difference and sum of the outer channels ``(3, h, w)``, each over its mean, averaged over speckle."""
     coarse = adaptive_avg_pool2d(image[None], [min(COARSE, side) for side in image.shape[1:]])[0]
     red, _, blue = coarse / coarse.mean((1, 2), keepdim=True).clamp_min(1e-12)
-    return red - blue - (red - blue).mean()
+    return red - blue, red + blue
+
+
+def _correlation(first: Tensor, second: Tensor) -> float:
+    """That of two pictures; 0 where one of them is even."""
+    return float(torch.stack([first.flatten(), second.flatten()]).corrcoef()[0, 1].nan_to_num())

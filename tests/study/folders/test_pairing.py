@@ -248,4 +248,6 @@ def test_exchanged_colours_are_told_from_right_ones_whatever_their_brightness(ga
     assert exchange(seen, target) == ""
     assert exchange(seen.flip(0), target) == exchange(seen, target.flip(0)) != ""
     gray = target.mean(0).expand(3, -1, -1)
+    other = torch.from_numpy(photograph("rocket", (120, 150)))
+    assert exchange(seen, other) == exchange(seen.flip(0), other) == ""  # another picture has no order of colours
     assert exchange(seen, gray) == exchange(gray, target) == exchange(seen[:1], target[:1]) == ""
