@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
+from skimage import data
 
 import holobench_eval as hb
 from holobench_eval import interactive
@@ -286,6 +287,9 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: hb.compare(t, [t]), "captures: expected arrays by their names"),
         (lambda d, t: hb.compare(t, {"a": t}, "compared.tif"), "'compared.tif' should end in .png, .jpg, .jpeg"),
         (lambda d, t: hb.compare(t, {}), "no captures to compare"),
+        (lambda d, t: hb.compare(t, {"a": t}, f"{__file__}/a.png"), "a.png' cannot be written: File exists"),
+        (lambda d, t: hb.score(torch.zeros(t.shape).to_sparse(), t), "a capture as a tensor that NumPy cannot read"),
+        (lambda d, t: hb.score(torch.empty(t.shape, device="meta"), t), "expected a dense one"),
         (lambda d, t: hb.compare(t, {"a": t}, None), "path: expected a path; got NoneType"),
         (lambda d, t: hb.picture(t[:, 1:], t), r"a capture of \(3, 103, 104\) and a target of"),
         (lambda d, t: hb.load_records("gone"), "no records.csv"),
@@ -302,6 +306,12 @@ def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
 def test_light_far_below_zero_is_warned_of(target: interactive.Array, taken: float) -> None:
     with pytest.warns(UserWarning, match="darker than the target where it is darkest, by more than 5% of its white"):
         hb.score(np.asarray(target) - taken, target, metrics=["psnr"])
+
+
+def test_colours_in_another_order_are_warned_of(display: hb.OpenDisplay) -> None:
+    light = display.target(data.astronaut())
+    with pytest.warns(UserWarning, match="red and blue are exchanged in the capture or in its target"):
+        hb.score(np.asarray(light)[::-1], light, metrics=["psnr"])
 
 
 def test_a_folder_is_no_picture(target: interactive.Array, tmp_path: Path) -> None:

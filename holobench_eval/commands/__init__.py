@@ -135,7 +135,9 @@ def main() -> None:
     try:
         app()
     except (UserError, OSError) as error:
-        print(f"holoeval: {one_line(str(error))}", file=sys.stderr)
+        has_place = isinstance(error, OSError) and error.filename is not None and error.strerror is not None
+        text = f"{error.filename}: {error.strerror}" if has_place else str(error)
+        print(f"holoeval: {one_line(text)}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, RuntimeError) as error:
         if not out_of_memory(error):

@@ -58,6 +58,14 @@ def plan(
     learning = trainings(grid, Artifacts(artifacts))
     rows = preview(study, grid, Store(folder), many, workers, gpu_name(find(device)), networks, learning)
     console.print(table(study, rows))
+    if unscored := sum(row.unscored for row in rows):
+        names = listed(dict.fromkeys(name for row in rows for name in row.lacking))
+        console.print(
+            f"{unscored} of the done cells lack scores: {names}. 'holoeval rescore' fills them from kept captures, and "
+            "'holoeval run' the rest on a simulated display.",
+            highlight=False,
+            soft_wrap=True,
+        )
     if all(row.seconds is None for row in rows):
         console.print("No method of it was timed on this machine before; 'holoeval run' says what is left.")
     if learning:
@@ -78,7 +86,7 @@ class Row:
     label; conditions: displays it is shown on; targets, cells: their numbers; photographs: the most in total on each
     display as on the board, those of its training included (None: of floors; NaN: not known before its training); done,
     failed, missing: cells by state; seconds: time its missing solutions would take, from the solutions that were timed
-    before (None: none was).
+    before (None: none was); unscored: those of the done cells that lack scores; lacking: the names of these scores.
     """
 
     label: str
@@ -90,6 +98,8 @@ class Row:
     failed: int
     missing: int
     seconds: float | None
+    unscored: int = 0
+    lacking: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -122,6 +132,7 @@ def preview(
     """Count the cells of every method of a plan, the floor first. threads, workers, gpu: as in ``cost.key``; networks:
     as in ``Store.states``; learning: what the plan's methods must learn."""
     from ..study import cost, isolation
+    from ..study.identity import lacking
 
     methods = {entry.label: entry for entry in study.methods}
     states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks)
@@ -138,6 +149,7 @@ def preview(
         known = {kind: seconds for kind in kinds if (seconds := cost.recorded(kind)) is not None}
         estimates = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
         targets = len({cell.target for cell in cells})
+        unscored = [record for cell in cells if states[cell.id] == "unscored" and (record := store.read(cell.id))]
         rows.append(
             Row(
                 label,
@@ -149,6 +161,10 @@ def preview(
                 failed=count["failed"],
                 missing=count["missing"] + count["untimed"],
                 seconds=None if label == FLOOR or (kinds and not known) else sum(estimates),
+                unscored=len(unscored),
+                lacking=tuple(
+                    dict.fromkeys(name for record in unscored for name in lacking(record.scores, plan.metrics))
+                ),
             )
         )
     return rows

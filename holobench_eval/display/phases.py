@@ -20,6 +20,8 @@ GRAIN = 4  # pixels a side over which speckle is averaged
 FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right phases too may come below UNLIKE
 JUMP = 10 * math.tau  # rad between neighbours, which radians, wrapped or smooth, have no need of
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
+FACTOR = "multiplied by"
+TIE = 0.01  # by which a factor has to fit better than a unit, which it nearly is where the values fill the unit's span
 
 UNITS = {  # what values in a span may be, and what makes radians of them
     (0.0, 1.0): ("turns or amplitudes", math.tau),
@@ -103,23 +105,45 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     own = as_given.get("", 1.0)
     if own >= RIGHT or low == high:
         return ""
-    readings = {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}
-    for (first, last), (unit, scale) in UNITS.items():
-        if first <= low and high <= last:
-            readings[f"read as {unit}"] = scale * phase
     fits = [(fit, pose) for pose, fit in as_given.items()]
-    for reading, values in readings.items():
-        fits += [(fit, f"{reading}, {pose}".removesuffix(", ")) for pose, fit in _fits(values, target, spec).items()]
-    best, how = max(fits)
+    for how, values in {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}.items():
+        fits += _fits_of(how, values, target, spec)
+    for how, scale in _scales(low, high).items():
+        # An amplitude, or the magnitude of a phase, is somewhat like its target in any unit; the right unit is more.
+        fits += [each for each in _fits_of(how, scale * phase, target, spec) if each[0] >= RIGHT]
+    best, how = max(fits, key=lambda each: each[0] - TIE * each[1].startswith(FACTOR))
     if best >= own + BETTER and best >= UNLIKE:
         return f"fits its target better {how} (correlation {best:.2f} on the nominal model; as it is, {own:.2f})"
     correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have about 0.9"
-    if filled := unit_doubt(phase):
-        return f"{filled} ({correlation})"
-    if own < UNLIKE:
-        as_amplitudes = " and is never negative, as amplitudes are" if low >= 0 and high < math.pi else ""
-        return f"makes nothing like its target{as_amplitudes} ({correlation})"
+    if _is_amplitude(phase, target, spec):
+        return f"grows with the amplitude of the light that makes its target, and is not its phase ({correlation})"
+    if own < UNLIKE or unit_doubt(phase):
+        like = "nothing like" if own < UNLIKE else "little of"
+        return f"makes {like} its target (values from {low:.2f} to {high:.2f}; {correlation})"
     return ""
+
+
+def _scales(low: float, high: float) -> dict[str, float]:
+    """What makes radians of values in so wide a range: of those in another unit, and of others that fill a turn."""
+    within = [UNITS[first, last] for first, last in UNITS if first <= low and high <= last]
+    scales = {f"read as {unit.partition(' or ')[0]}": scale for unit, scale in within}
+    factor = math.tau / (high - low)
+    return scales if abs(factor - 1) < EDGE else {**scales, f"{FACTOR} {factor:.3g}": factor}
+
+
+def _fits_of(how: str, phase: Tensor, target: Tensor, spec: DisplaySpec) -> list[tuple[float, str]]:
+    """The fits of values that were read otherwise, each with how, and with the pose."""
+    return [(fit, f"{how}, {pose}".removesuffix(", ")) for pose, fit in _fits(phase, target, spec).items()]
+
+
+def _is_amplitude(values: Tensor, target: Tensor, spec: DisplaySpec) -> bool:
+    """Whether values ``(C, H, W)`` are, in any unit, the amplitude of the target's light at the panel."""
+    pairs = []
+    for channel, plane in enumerate(target if values.ndim == 3 else ()):
+        field = spec.region.embed(plane.sqrt(), spec.shape).to(torch.complex64)
+        back = spec.propagator(channel).adjoint(field).abs()
+        pairs.append(torch.stack([values[channel].flatten(), back.flatten()]).corrcoef()[0, 1])
+    return bool(pairs) and float(torch.stack(pairs).nanmean()) >= RIGHT  # a colour without light has none
 
 
 def unit_doubt(phase: Tensor) -> str:

@@ -27,8 +27,11 @@ def array_of(values: Numbers, what: str) -> NDArray[Any]:
     what: these numbers, in the UserError for lists that are no array. An array comes back as it is, not as a copy.
     """
     if isinstance(values, Tensor):
-        values = values.detach().cpu().resolve_conj().resolve_neg()
-        return (values.float() if values.dtype == torch.bfloat16 else values).numpy()  # NumPy has no such type
+        try:
+            values = values.detach().cpu().resolve_conj().resolve_neg()
+            return (values.float() if values.dtype == torch.bfloat16 else values).numpy()  # NumPy has no such type
+        except (TypeError, RuntimeError):  # sparse, quantised, or without memory
+            raise UserError(f"{what} as a tensor that NumPy cannot read; expected a dense one") from None
     if isinstance(values, np.ma.MaskedArray):
         raise UserError(f"{what} with a mask; expected an array without one, such as values.filled(0)")
     try:

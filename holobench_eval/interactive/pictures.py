@@ -24,6 +24,7 @@ from ..metrics import score as _score
 from ..optics.colour import srgb_encode
 from ..study.folders.doubts import LIFTED
 from ..study.folders.exposure import darkest
+from ..study.folders.pairing import exchange
 from .described import Scores, refuse_swapped
 from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of
 
@@ -82,6 +83,8 @@ def score(
     if darkest(light, wanted) < -LIFTED:
         text = f"the capture is darker than the target where it is darkest, by more than {LIFTED:.0%} of its white"
         warnings.warn(f"{text}: dark counts that are too high do that", stacklevel=2)
+    if swapped := exchange(light, wanted):
+        warnings.warn(swapped, stacklevel=2)
     return Scores(found)
 
 
@@ -118,7 +121,8 @@ def save_levels(phase: Numbers, path: str | Path, **convention: Any) -> Path:
     phase
         ``(C, H, W)`` [rad], C = 1 or 3: ``phase[:1]`` is the first colour alone.
     path
-        Of the picture, which ends in .png. ``display.solve("phases", target, file=path)`` reads it back.
+        Of the picture, which ends in .png. Its folder is made where there is none.
+        ``display.solve("phases", target, file=path)`` reads it back.
     **convention
         What the levels mean, by the keys of ``phase`` in the file of a bench: ``two_pi_level`` (256 unless given; a
         list has one for each colour), ``sign``, ``origin``, ``correction``, ``flip_horizontal``, ``flip_vertical``.
@@ -162,7 +166,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     captures
         ``(C, h, w)`` linear light as floating point, by the names of their columns.
     path
-        Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg.
+        Of the picture: a PNG or a JPEG, as it ends in .png, .jpg or .jpeg. Its folder is made where there is none.
 
     Returns
     -------
@@ -200,10 +204,12 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
         note = f"PSNR {scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
         columns.append(Column(name, (Tile(shown, note),)))
         errors.append(error_map(shown, truth))
-    place.parent.mkdir(parents=True, exist_ok=True)
-    draw_comparison(
-        place, "captures, each at the brightness that fits best", [("", truth)], columns, error_limit(errors)
-    )
+    title = "captures, each at the brightness that fits best"
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        draw_comparison(place, title, [("", truth)], columns, error_limit(errors))
+    except OSError as error:
+        raise UserError(f"path: '{path}' cannot be written: {error.strerror or error}") from None
     return place
 
 

@@ -74,6 +74,8 @@ def _picture(content: bytes) -> NDArray[Any]:
         if stored.is_floating or stored.bits not in (8, 16):
             kind = "floating-point " if stored.is_floating else ""
             raise CellError(f"a {stored.bits}-bit {kind}picture; expected 8 or 16 bits")
+        if stored.has_palette:  # its values are places in a table, whose colours may be the levels or anything else
+            raise CellError("a picture with a palette; expected gray or RGB, whose values are the levels themselves")
         if stored.is_lossy:
             raise CellError("a picture that is compressed with loss; expected its levels as they are")
         return stored.values()

@@ -128,6 +128,7 @@ def test_a_study_from_run_to_check(config: Path, call: Call) -> None:
         (("run", "absent.yaml"), "absent.yaml: no such file in "),
         (("run", "toy.yaml", "--executor", "lokal"), "unknown executor 'lokal'; did you mean 'local'?"),
         (("run", "toy.yaml", "--executor", "serial", "--workers", "3"), "--workers 3 needs --executor local"),
+        (("run", "toy.yaml", "--output", "toy.yaml/out"), ": Not a directory\n"),
         (("report", "toy.yaml"), "no records in this folder"),
         (("list", "metods"), "unknown kind 'metods'; did you mean 'methods'?"),
         (("new-method", "Class"), "'Class' is no name for a method"),
@@ -141,6 +142,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert (code, out) == (2, "")
     assert err.startswith("holoeval: ")
     assert message in err
+    assert "Errno" not in err
     assert err.count("\n") == 1
 
 

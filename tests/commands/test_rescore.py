@@ -34,7 +34,7 @@ from tests.support.trained_study import compute
 @pytest.fixture(autouse=True)
 def _one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Others would not know the metric."""
-    monkeypatch.setattr(executors, "executor", lambda *_: executors.Serial())
+    monkeypatch.setattr(executors, "executor", lambda *_, **__: executors.Serial())
 
 
 def rescored(*arguments: object) -> tuple[str, str]:
@@ -88,6 +88,16 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
     store = Store(report)  # which has one record and one capture for each cell
     assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in plan(load_study(config)).cells}
     assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
+
+
+def test_a_plan_says_which_columns_of_what_is_done_are_empty(report: Path) -> None:
+    config = report.parent / "study.yaml"
+    said, failure = sessions.run("plan", config, "--output", report)
+    assert not failure
+    (line,) = (line for line in said.splitlines() if "lack scores" in line)
+    assert line.startswith(f"14 of the done cells lack scores: {NAME}. 'holoeval rescore' fills them from kept")
+    rescored(config, "--output", report)
+    assert "lack scores" not in sessions.run("plan", config, "--output", report)[0]
 
 
 def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> None:

@@ -272,3 +272,19 @@ def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tm
     for said in (text, terminal):
         assert "Not alike pixel to pixel, with correlations below 0.25: wrong/astronaut" in said
     assert "right/" not in terminal.partition("Not alike")[2].partition("\n")[0]
+
+
+@pytest.mark.parametrize("values", ["stored", "srgb", "linear"])
+@pytest.mark.parametrize("place", ["targets", "captures/m"])
+def test_red_and_blue_that_changed_places_have_no_score_but_a_reason(tmp_path, place, values):
+    for name in ("astronaut", "coffee"):
+        target = photograph(name, SHAPE)
+        save(tmp_path / "targets" / f"{name}.png", target)
+        seen = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.5) * LASERS * 0.9
+        save(tmp_path / "captures" / "m" / f"{name}.png", seen)
+    assert (run(tmp_path, values, aligned=True)[2]["state"] == "done").all()
+    for path in (tmp_path / place).iterdir():
+        cv2.imwrite(str(path), cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+    records = run(tmp_path, values, aligned=True)[2]
+    assert (records["state"] == "failed").all()
+    assert records["reason"].str.contains("red and blue are exchanged in the capture or in its target").all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from pathlib import Path
 
@@ -48,6 +49,9 @@ ODD = {
     "half turns": (lambda phase: phase / math.pi, "better read as half turns"),
     "half turns of both signs": (lambda phase: (phase / math.pi + 1) % 2 - 1, "better read as half turns"),
     "levels over their number": (lambda phase: (phase / TAU * 255).round() / 255, "better read as turns"),
+    "a ninth": (lambda phase: phase / 9, "better multiplied by 9"),
+    "levels of 10 bits in a file of 16": (lambda phase: 2**-6 * phase, "better multiplied by 6"),
+    "ten times": (lambda phase: 10 * phase, "better multiplied by 0.1"),
     "noise": (lambda phase: 6 * torch.rand(phase.shape, generator=DRAW.manual_seed(1)), "makes nothing like"),
 }
 
@@ -108,16 +112,26 @@ def test_a_right_phase_of_a_nearly_even_target_is_not_remarked_on(
     assert phase_doubt(solved(display, even, method) % TAU, even, display.spec) == ""
 
 
-@pytest.mark.parametrize(
-    ("largest", "remark"), [(1.0, "to 1.00, as turns or amplitudes have"), (2.5, "as amplitudes are")]
-)
-def test_an_amplitude_in_the_place_of_a_phase_is_remarked_on(
-    display: hb.OpenDisplay, target: Tensor, largest: float, remark: str
+@pytest.mark.parametrize("largest", [0.1, 1.0, 2.5, 9.0, 255.5, 360.0])
+def test_an_amplitude_in_the_place_of_a_phase_is_named_whatever_its_unit(
+    display: hb.OpenDisplay, target: Tensor, largest: float
 ) -> None:
     spec = display.spec
     planes = [spec.region.embed(plane.sqrt(), spec.shape).to(torch.complex64) for plane in target]
     back = torch.stack([spec.propagator(c).adjoint(plane) for c, plane in enumerate(planes)]).abs()
-    assert remark in phase_doubt(largest * back / back.max(), target, spec)
+    assert phase_doubt(largest * back / back.max(), target, spec).startswith("grows with the amplitude of")
+
+
+@pytest.mark.parametrize("method", ["double_phase", "gerchberg_saxton"])
+@pytest.mark.parametrize("largest", [0.35, 1.0, 2.0, 255.5, 360.0])
+def test_a_cause_is_named_only_where_it_makes_the_target(
+    display: hb.OpenDisplay, target: Tensor, method: str, largest: float
+) -> None:
+    own = solved(display, target, method)
+    magnitude = ((own + math.pi) % TAU - math.pi).abs()
+    for values in (magnitude / magnitude.max(), torch.rand(own.shape, generator=DRAW.manual_seed(2))):
+        remark = phase_doubt(largest * values, target, display.spec)
+        assert re.match(r"makes (nothing like|little of) its target \(values from .* to \d+\.\d\d; correlation", remark)
 
 
 def test_nothing_is_said_where_there_is_nothing_to_compare_and_a_colour_without_light_has_no_part(

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import torch
+from torch import Tensor
+from torch.nn.functional import adaptive_avg_pool2d
+
 from ...imaging.warp import Warp
 from .exposure import NAMES, levels, refusal, within
 from .pictures import Picture, Values
@@ -12,6 +16,12 @@ LASER = 0.3  # of the strongest channel: what filters of a colour camera let thr
 
 SAVE_TARGET = "save the target as it was shown, in gray"  # ends what is refused by a fault of the target
 UNKNOWN = f"which gray picture was shown is not known; {SAVE_TARGET}"
+# Correlation of red less blue in a capture and its target: captures of simulated displays have 0.00 to 0.88 and real
+# ones (Stanford 2021) 0.88 to 0.93, and with red and blue exchanged the negative of that.
+EXCHANGED = -0.2
+COARSE = 36  # averages a side, in which speckle weighs little
+ALIKE = 0.25  # correlation of red and blue together, which an exchange leaves as it is
+COLOURFUL = 0.05  # of the mean of a channel: least contrast of red less blue in a target that can tell
 NEARLY = "whose channels differ by a few levels of 255, as those of a gray picture that was saved as a JPEG in colour"
 
 
@@ -102,3 +112,33 @@ def _single_laser(capture: Picture, target: Picture) -> int | None:
     seen = [own / of_target for own, of_target in zip(capture.structure, wanted, strict=True)]
     second, strongest = sorted(seen)[1:]
     return seen.index(strongest) if second <= LASER * strongest else None
+
+
+def exchange(image: Tensor, reference: Tensor) -> str:
+    """What is wrong where a capture ``(C, h, w)`` has the red of its target as blue and the reverse; empty elsewhere.
+
+    Libraries differ in the order of colours, and nothing in a file tells one from the other.
+    """
+    if len(image) != 3:
+        return ""
+    (seen, seen_sum), (wanted, wanted_sum) = (_of_red_and_blue(each) for each in (image, reference))
+    if float(wanted.std()) < COLOURFUL or _correlation(seen_sum, wanted_sum) < ALIKE:  # gray, or another picture
+        return ""
+    if (correlation := _correlation(seen, wanted)) >= EXCHANGED:
+        return ""
+    return (
+        f"red and blue are exchanged in the capture or in its target (their difference correlates by {correlation:.2f})"
+        "; save the wrong one with red first"
+    )
+
+
+def _of_red_and_blue(image: Tensor) -> tuple[Tensor, Tensor]:
+    """Difference and sum of the outer channels ``(3, h, w)``, each over its mean, averaged over speckle."""
+    coarse = adaptive_avg_pool2d(image[None], [min(COARSE, side) for side in image.shape[1:]])[0]
+    red, _, blue = coarse / coarse.mean((1, 2), keepdim=True).clamp_min(1e-12)
+    return red - blue, red + blue
+
+
+def _correlation(first: Tensor, second: Tensor) -> float:
+    """That of two pictures; 0 where one of them is even."""
+    return float(torch.stack([first.flatten(), second.flatten()]).corrcoef()[0, 1].nan_to_num())

@@ -35,7 +35,7 @@ from ..versions import ALIGNMENT, HARNESS
 from . import FILES, alignment_name
 from .exposure import burnt, darkest
 from .files import Folders, Key
-from .pairing import too_few_levels
+from .pairing import exchange, too_few_levels
 from .pictures import Values
 from .visible import LEAST, Part, cropped, largest_part, part_of, share, shown
 
@@ -253,6 +253,8 @@ class Scoring:
         figures = self.second(frame, compared, warp)
         # In the precision that scores are computed in, so that there is no second copy of a large picture.
         image, reference = torch.from_numpy(sampled(frame, warp)).double(), compared.double()
+        if swapped := exchange(image, reference):
+            return self.failed(cell, swapped)
         figures["darkest"] = darkest(self.as_light(image), self.as_light(reference))
         del capture, frame, compared  # of a large picture, read again to be drawn
         scores = self.scores(image, reference, self.metrics)

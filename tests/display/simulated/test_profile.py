@@ -1,3 +1,4 @@
+import math
 from importlib.resources import files
 
 import pytest
@@ -114,6 +115,29 @@ def test_a_fault_of_a_base_is_told_of_the_file_that_has_it(tmp_path, base, place
     (tmp_path / "base.yaml").write_text(base)
     (tmp_path / "mine.yaml").write_text("like: base.yaml\nname: mine\n")
     with pytest.raises(UserError, match=place):
+        load_profile("mine.yaml", tmp_path)
+
+
+@pytest.mark.parametrize("stage", ["panel: {bits: 4, levels", "lut: {table"])
+@pytest.mark.parametrize(
+    ("full", "says"),
+    [
+        (math.tau * 15 / 16, "in radians each entry times 16.98$"),
+        (337.5, "in degrees each entry times 0.2963$"),
+        (0.9375, "in turns each entry times 106.7$"),
+        (4095, "170$"),
+        (0, "170$"),
+        (100, ""),
+        (60, ""),
+    ],
+)
+def test_a_table_of_levels_in_another_unit_is_refused_with_its_factor(tmp_path, stage, full, says):
+    levels = [full * (level / 15) ** 2 for level in range(16)]
+    (tmp_path / "mine.yaml").write_text(f"name: mine\nlike: plm-4bit\n{stage}: {levels}}}\n")
+    if not says:
+        assert max(load_profile("mine.yaml", tmp_path).panel.levels) > 0
+        return
+    with pytest.raises(UserError, match=rf"mine.yaml:3:\d+: the table spans .* turns; expected 20 to .*{says}"):
         load_profile("mine.yaml", tmp_path)
 
 

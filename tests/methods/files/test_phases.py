@@ -214,6 +214,10 @@ def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for ending in ("png", "bmp"):
         Image.fromarray(pixels[..., 0] > 127).save(folder / f"bit.{ending}")
     Image.fromarray(pixels[..., 0] // 16).convert("P").save(folder / "four.png", bits=4)
+    for ending in ("png", "tif", "bmp"):
+        indices = Image.fromarray(pixels[..., 0])
+        indices.putpalette(np.repeat(np.arange(256, dtype=np.uint8)[::-1], 3).tobytes())  # gray, black last
+        indices.save(folder / f"palette.{ending}")
     picture.save(folder / "photograph.png", "JPEG")
     np.save(folder / "bool.npy", LEVELS > 127)
     savemat(folder / "logical.mat", {"a": LEVELS > 127})
@@ -252,6 +256,7 @@ def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("alpha.png", {}, "a picture with alpha"),
         ("pages.tif", {}, "2 frames or pages; expected a file with one picture"),
         ("turned.png", {}, "EXIF orientation 3; expected one that is stored upright"),
+        *((f"palette.{end}", {}, "a picture with a palette; expected gray or RGB") for end in ("png", "tif", "bmp")),
         ("bit.png", {}, "a 1-bit picture; expected 8 or 16 bits"),
         ("bit.bmp", {}, "a 1-bit picture; expected 8 or 16 bits"),
         ("four.png", {}, "a 4-bit picture; expected 8 or 16 bits"),

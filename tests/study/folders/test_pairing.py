@@ -7,12 +7,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image, ImageCms
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.imaging.warp import Warp
 from holobench_eval.study.folders.exposure import FEWEST_LEVELS, levels, refusal, within
 from holobench_eval.study.folders.files import Folders, read_folders
+from holobench_eval.study.folders.pairing import exchange
 from holobench_eval.study.folders.pictures import checked
 from tests.support.bayer import bayer_dng
 from tests.support.photographed import Picture, photograph, save
@@ -231,3 +235,19 @@ def test_a_lamp_beside_the_target_adds_no_levels():
     assert levels(frame).any > FEWEST_LEVELS >= seen.any
     shown = levels(cv2.resize(GRAY[0], (80, 60)))
     assert "under-exposed: it has" in refusal([("", seen, shown)], aligned=True)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    gains=st.tuples(*[st.floats(0.1, 10)] * 3), leak=st.floats(0, 0.3), haze=st.floats(0, 0.2), speckle=st.floats(0, 1)
+)
+def test_exchanged_colours_are_told_from_right_ones_whatever_their_brightness(gains, leak, haze, speckle):
+    target = torch.from_numpy(photograph("coffee", (120, 150)))
+    grain = 1 + speckle * (2 * torch.rand(target.shape, generator=torch.Generator().manual_seed(0)) - 1)
+    seen = (target + leak * target.mean(0) + haze) * grain * torch.tensor(gains)[:, None, None]
+    assert exchange(seen, target) == ""
+    assert exchange(seen.flip(0), target) == exchange(seen, target.flip(0)) != ""
+    gray = target.mean(0).expand(3, -1, -1)
+    other = torch.from_numpy(photograph("rocket", (120, 150)))
+    assert exchange(seen, other) == exchange(seen.flip(0), other) == ""  # another picture has no order of colours
+    assert exchange(seen, gray) == exchange(gray, target) == exchange(seen[:1], target[:1]) == ""

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Wavelength = Annotated[float, Metres(200e-9, 2000e-9)]
 TOLD_LINES = 7  # by which methods are told of a line
+SMALLEST_SPAN, LARGEST_SPAN = 20.0, 170.0  # of a table of levels [percent]: no panel has less stroke or more
+TURNS = {"radians": TAU, "degrees": 360.0, "turns": 1.0}
 
 
 class OneOrThree(Check):
@@ -117,11 +119,20 @@ class Panel(Stage):
             yield "blaze", "the picture of a Fourier plane is placed beside the zero order by region_offset, not blaze"
 
     def fault_of(self, table: Sequence[float]) -> str:
-        """What is wrong with the length of a table of the panel's levels; empty for none, and for no table."""
+        """What is wrong with a table of levels, its length or its unit; empty for nothing, and for no table."""
         count = 2**self.bits
-        if len(table) in (0, count):
+        if len(table) not in (0, count):
+            return f"the table has {len(table)} entries; a panel of {self.bits} bits has {count}"
+        span = max(table) - min(table) if table else 100.0
+        if SMALLEST_SPAN <= span <= LARGEST_SPAN:
             return ""
-        return f"the table has {len(table)} entries; a panel of {self.bits} bits has {count}"
+        factors = {unit: 100 / (turn * (1 - 1 / count)) for unit, turn in TURNS.items()}
+        meant = (unit for unit in factors if SMALLEST_SPAN <= factors[unit] * span <= LARGEST_SPAN)
+        remedy = next((f"; of a table in {unit} each entry times {factors[unit]:.4g}" for unit in meant), "")
+        return (
+            f"the table spans {span:.4g} percent of the largest phase, which is {1 - 1 / count:.4g} turns; expected "
+            f"{SMALLEST_SPAN:g} to {LARGEST_SPAN:g}{remedy}"
+        )
 
     def effects(self, profile: Profile) -> Iterator[Effect]:
         """Gray levels and blaze."""
