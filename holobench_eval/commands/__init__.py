@@ -135,8 +135,9 @@ def main() -> None:
     try:
         app()
     except (UserError, OSError) as error:
-        has_place = isinstance(error, OSError) and error.filename is not None and error.strerror is not None
-        text = f"{error.filename}: {error.strerror}" if has_place else str(error)
+        text = str(error)
+        if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
+            text = f"{error.filename}: {error.strerror}"
         print(f"holoeval: {one_line(text)}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, RuntimeError) as error:

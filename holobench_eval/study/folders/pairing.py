@@ -134,7 +134,8 @@ def exchange(image: Tensor, reference: Tensor) -> str:
 
 def _of_red_and_blue(image: Tensor) -> tuple[Tensor, Tensor]:
     """Difference and sum of the outer channels ``(3, h, w)``, each over its mean, averaged over speckle."""
-    coarse = adaptive_avg_pool2d(image[None], [min(COARSE, side) for side in image.shape[1:]])[0]
+    rows, columns = (min(COARSE, side) for side in image.shape[1:])
+    coarse = adaptive_avg_pool2d(image[None], (rows, columns))[0]
     red, _, blue = coarse / coarse.mean((1, 2), keepdim=True).clamp_min(1e-12)
     return red - blue, red + blue
 
