@@ -28,7 +28,7 @@ from .versions import method_version
 
 RESULTS = "holoeval-results"  # the folder of all studies that are given no other
 # Of a solution, beside its cost.
-KEPT = ("phase", "captures", "stopped", "learned", "alone", "covered", "uncovered")
+KEPT = ("phase", "captures", "stopped", "learned", "alone", "covered", "uncovered", "shown")
 LEVELS = 2**16  # of a start, to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
 
 
