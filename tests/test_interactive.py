@@ -314,6 +314,22 @@ def test_colours_in_another_order_are_warned_of(display: hb.OpenDisplay) -> None
         hb.score(np.asarray(light)[::-1], light, metrics=["psnr"])
 
 
+@pytest.mark.parametrize("kind", ["f4", "f8", ">f4"])
+def test_levels_as_floating_point_are_warned_of_and_light_is_not(display: hb.OpenDisplay, kind: str) -> None:
+    levels = data.astronaut()
+    with pytest.warns(UserWarning, match="all values are levels of 255, as of a picture in sRGB, and are taken as"):
+        display.target((levels / 255).astype(kind))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        light = display.target(levels)
+        display.target(np.asarray(light).astype(kind))
+        display.target((levels > 99).astype(kind))  # black and white is the same in both
+        hb.score(np.asarray(light), light, metrics=["psnr"])
+    part = (levels[:64, :64] / 255).transpose(2, 0, 1)
+    with pytest.warns(UserWarning, match="all values are levels of 255"):
+        hb.score(part, part, metrics=["psnr"])
+
+
 def test_a_folder_is_no_picture(target: interactive.Array, tmp_path: Path) -> None:
     (tmp_path / "a.png").mkdir()
     with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):

@@ -126,6 +126,12 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
     return PLAIN_SIGNS.get(error.object[error.start], "?"), error.start + 1
 
 
+def _told(error: Exception) -> str:
+    """An error with its place first, of a copy that where it goes."""
+    place = (error.filename2 or error.filename) if isinstance(error, OSError) else None
+    return f"{place}: {error.strerror}" if isinstance(error, OSError) and place and error.strerror else str(error)
+
+
 def main() -> None:
     """Run the command line; bad input and files that cannot be used are one line on stderr and exit code 2."""
     codecs.register_error("plain", _plain)
@@ -135,10 +141,7 @@ def main() -> None:
     try:
         app()
     except (UserError, OSError) as error:
-        text = str(error)
-        if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
-            text = f"{error.filename}: {error.strerror}"
-        print(f"holoeval: {one_line(text)}", file=sys.stderr)
+        print(f"holoeval: {one_line(_told(error))}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, RuntimeError) as error:
         if not out_of_memory(error):

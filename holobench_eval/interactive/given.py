@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection
 from pathlib import Path, PurePath
 from typing import Any
@@ -17,6 +18,7 @@ from .described import PHASE
 
 Numbers = ArrayLike | Tensor
 FULL = {"uint8": 255, "uint16": 65535}  # scale of the levels of pictures
+CLOSE, MANY = 1e-3, 17  # of a level; fewer different values may be a chart's
 LIGHT = "linear light in [0, 1] as floating point; OpenDisplay.target makes it of a picture"
 RADIANS = "radians as floating point, as np.angle gives them; the method phases reads files"
 
@@ -81,6 +83,21 @@ def capture_of(values: Numbers, what: str, meaning: object) -> Tensor:
     if not (float(encoded.min()) >= 0 and float(encoded.max()) <= 1):  # nor NaN
         raise UserError(f"{what} of {array.dtype}; as sRGB expected uint8, uint16, or floating point in [0, 1]")
     return srgb_decode(encoded)
+
+
+def warn_of_levels(picture: NDArray[Any], stacklevel: int) -> None:
+    """Warn of floating point that holds levels of a picture, as ``plt.imread`` and ``img_as_float`` give them.
+
+    All of them are multiples of 1 / 255, which light is by no chance. stacklevel: as in ``warnings.warn``, of the
+    caller.
+    """
+    if picture.dtype.kind != "f" or not picture.size:
+        return
+    scaled = picture.astype(np.float64) * FULL["uint8"]
+    if np.abs(scaled - scaled.round()).max() > CLOSE or len(np.unique(scaled.round())) < MANY:
+        return
+    text = "all values are levels of 255, as of a picture in sRGB, and are taken as linear light"
+    warnings.warn(f"{text}; levels are given as uint8: (255 * x).round().astype('uint8')", stacklevel=stacklevel + 1)
 
 
 def as_in_config(value: Any) -> Any:

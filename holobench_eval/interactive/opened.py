@@ -25,7 +25,17 @@ from ..display.traits import refuse_plane, traits_of
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .described import CAPTURE, IDEAL, PHASE, TARGET, Array, Described, described
-from .given import LIGHT, RADIANS, Numbers, array_of, as_in_config, path_of, tensor_of, whole
+from .given import (
+    LIGHT,
+    RADIANS,
+    Numbers,
+    array_of,
+    as_in_config,
+    path_of,
+    tensor_of,
+    warn_of_levels,
+    whole,
+)
 from .methods import method_of
 
 
@@ -69,7 +79,9 @@ class OpenDisplay:
         if isinstance(picture, str | Path):
             light = decode(read(path_of(picture, "a picture")), str(picture), gray=True)
         else:
-            light = from_array(array_of(picture, "a picture"))
+            array = array_of(picture, "a picture")
+            light = from_array(array)
+            warn_of_levels(array, stacklevel=2)
         return described(with_channels(fit(light, self.spec.region.shape), len(self.spec.wavelengths)).numpy(), TARGET)
 
     def solve(self, method: Any, target: Numbers, **params: Any) -> Array:

@@ -26,7 +26,7 @@ from ..study.folders.doubts import LIFTED
 from ..study.folders.exposure import darkest
 from ..study.folders.pairing import exchange
 from .described import Scores, refuse_swapped
-from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of
+from .given import LIGHT, RADIANS, Numbers, as_in_config, capture_of, names, path_of, tensor_of, warn_of_levels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,6 +80,7 @@ def score(
     if lost:
         rows, columns = light.shape[1:]
         raise UserError(f"metrics: {', '.join(lost)} cannot be computed here of {rows} x {columns} pixels")
+    warn_of_levels(wanted.numpy(), stacklevel=2)
     if darkest(light, wanted) < -LIFTED:
         text = f"the capture is darker than the target where it is darkest, by more than {LIFTED:.0%} of its white"
         warnings.warn(f"{text}: dark counts that are too high do that", stacklevel=2)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, MaxLen, MinLen
 
 from ..core.errors import CellError, UserError
-from ..core.schema import typed
+from ..core.schema import FieldError, typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
 from ..display.simulated.stages import Panel
@@ -42,19 +42,23 @@ class CaptureSettings:
     settle: Literal["auto"] | float = "auto"
 
     def __post_init__(self) -> None:
+        """FieldError, with its place in a bench file."""
         if (self.dark_frames == 0) != (self.dark is not None):
-            raise UserError(
+            raise FieldError(
+                ("capture", "dark"),
                 "capture: either dark frames (dark_frames: 8) or, with dark_frames: 0, the counts without light "
-                "(dark: 64, or dark: a file)"
+                "(dark: 64, or dark: a file)",
             )
         # by hand, since of a union only the first type's fault would be reported
         for seconds in self.exposure if isinstance(self.exposure, tuple) else (self.exposure,):
             if seconds != "auto" and not 0 < seconds <= LONGEST:
-                raise UserError(
-                    f"capture.exposure should be auto, or above 0 and at most {LONGEST:g} s, got {seconds:g}"
+                raise FieldError(
+                    ("capture", "exposure"),
+                    f"capture.exposure should be auto, or above 0 and at most {LONGEST:g} s, got {seconds:g}",
                 )
         if self.settle != "auto" and not 0 <= self.settle <= LONGEST:
-            raise UserError(f"capture.settle should be auto, or 0 to {LONGEST:g} s, got {self.settle:g}")
+            message = f"capture.settle should be auto, or 0 to {LONGEST:g} s, got {self.settle:g}"
+            raise FieldError(("capture", "settle"), message)
 
     def exposures(self, channels: int) -> tuple[float, ...] | None:
         """Seconds for every channel; None for ``auto``. UserError for another number of channels."""

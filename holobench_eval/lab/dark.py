@@ -24,8 +24,8 @@ from .counts import read_counts
 class Dark:
     """Counts without light: bias and, for every unit of exposure, rate; of each sample, or numbers for all of them.
 
-    full: the count of full scale of the file that they come from, 1 for floating point that never exceeds 1; None where
-    there is no file, or nothing is known of its scale.
+    full: the count of full scale of the file that they come from, 1 for numbers that never exceed 1; None where
+    nothing is known of the scale.
     """
 
     bias: NDArray[Any]
@@ -48,10 +48,9 @@ class Dark:
 
     def refuse_other_scale(self, full: float) -> None:
         """UserError where photographs whose full scale is ``full`` counts cannot be on the scale of these."""
-        if self.full == 1:
-            raise UserError(
-                f"the dark frame never exceeds 1 and the photograph counts to {full:g}; expected its counts"
-            )
+        if self.full == 1 and not (self.bias.ndim == 0 and full <= 255):  # of which a level may be a part of a count
+            what = "level is below 1" if self.bias.ndim == 0 else "frame never exceeds 1"
+            raise UserError(f"the dark {what} and the photograph counts to {full:g}; expected its counts")
         if self.full is not None and (self.full > 255) != (full > 255):  # a camera of 12 bits writes files of 16
             depths = [16 if each > 255 else 8 for each in (self.full, full)]
             raise UserError("the dark frame has {} bits and the photograph {}; expected the same".format(*depths))
@@ -80,8 +79,11 @@ def given_dark(given: str | float, upright: bool = False) -> tuple[Dark, str]:
             raise UserError(
                 f"{path}: compressed with loss, no counts; expected a PNG, TIFF, .npy or RAW file, or a level"
             ) from None
+        mean, noise = float(counts.values.mean()), float(counts.values.std())
+        if mean < -noise:  # noise alone may put it below zero where dark counts were taken off before
+            raise UserError(f"{path}: {mean:.4g} on average; expected counts without light, 0 or more") from None
         full = counts.white if counts.values.dtype.kind == "u" else 1.0 if 0 < counts.white <= 1 else None
         return Dark(counts.values, full=full), hashlib.sha256(content).hexdigest()
     if not math.isfinite(level) or level < 0:
         raise UserError(f"dark {given}: expected counts without light, 0 or more, or a file")
-    return Dark(np.array(level, dtype=np.float32)), f"{level:g}"
+    return Dark(np.array(level, dtype=np.float32), full=1.0 if 0 < level < 1 else None), f"{level:g}"

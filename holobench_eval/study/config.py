@@ -265,7 +265,7 @@ def _check_labels(study: Study, document: Document) -> None:
                 raise document.error((*where[:2], "grid"), f"two rows are named '{label}'; list each value once")
             both = f"methods[{entry.row}] and methods[{first.row}] share the label '{label}'"
             raise document.error(where, f"{both}{but}; give one a 'label'")
-        if not label.isprintable() or len(label) > 60 or label in FLOORS:
+        if not label.isprintable() or len(label) > 60 or label in {*FLOORS, "floor"}:
             raise document.error(where, f"label {label!r} should be printable, at most 60 characters and not a floor's")
         for earlier, other in enumerate(study.methods[:index]):  # a measurement would be printed twice
             if measured[index] == measured[earlier] and set(entry.profiles) & set(other.profiles):

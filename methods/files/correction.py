@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ...core.errors import CellError
 from ...imaging.convention import Convention, per_colour
 from .arrays import read_array
 
+ROUNDING = 1e-3  # of a full turn in radians
 MOST_TURNS = 12  # of a map from end to end: of a panel that is uneven by six waves, twice in reflection
 
 
@@ -35,6 +37,12 @@ def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folde
     ):
         given = " x ".join(map(str, levels.shape))
         raise CellError(f"{path}: a correction of {given} levels; the panel has {shape[0]} x {shape[1]} pixels")
+    span = float(np.ptp(levels))
+    if levels.dtype.kind == "f" and 0 < span <= math.tau + ROUNDING and not (levels == levels.round()).all():
+        raise CellError(
+            f"{path}: {levels.dtype} from {levels.min():.4g} to {levels.max():.4g}, as radians or turns; a correction "
+            "holds levels: of radians times two_pi_level / 6.2832"
+        )
     turns = levels / per_colour(convention.correction.two_pi_level)
     if (most := float(np.ptp(turns))) > MOST_TURNS:
         raise CellError(

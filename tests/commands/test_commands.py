@@ -146,6 +146,25 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (OSError(30, "Read-only file system", "out"), "out: Read-only file system"),
+        (OSError(28, "No space left on device", "from", None, "to"), "to: No space left on device"),
+        (OSError(28, "No space left on device"), "[Errno 28] No space left on device"),
+        (OSError("a driver's own"), "a driver's own"),
+    ],
+)
+def test_a_refusal_of_the_system_begins_with_the_place(
+    monkeypatch: pytest.MonkeyPatch, call: Call, error: OSError, line: str
+) -> None:
+    def refused() -> None:
+        raise error
+
+    monkeypatch.setattr("holobench_eval.commands.app", refused)
+    assert call("list") == (2, "", f"holoeval: {line}\n")
+
+
 def test_a_mistake_in_a_config_leaves_nothing_behind(config: Path, call: Call) -> None:
     config.write_text(CONFIG.replace("panel", "pannel"))
     code, _, error = call("run", config)

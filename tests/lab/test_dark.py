@@ -43,11 +43,14 @@ def test_dark_counts_that_do_not_fit_are_refused_in_one_line(tmp_path: Path) -> 
     np.save(tmp_path / "small.npy", COUNTS[:, 1:])
     np.save(tmp_path / "eight.npy", np.zeros_like(COUNTS, np.uint8))
     np.save(tmp_path / "parts.npy", np.full(COUNTS.shape, 0.08, np.float32))
+    np.save(tmp_path / "negative.npy", np.full(COUNTS.shape, -60.0))
     Image.fromarray(np.full((24, 32), 60, np.uint8)).save(tmp_path / "lossy.jpg", quality=98)
     for given, line in (
         (tmp_path / "small.npy", "1 x 23 x 32 samples and the photograph 1 x 24 x 32"),
         (tmp_path / "eight.npy", "8 bits and the photograph 16"),
         (tmp_path / "parts.npy", "the dark frame never exceeds 1 and the photograph counts to 65535"),
+        (tmp_path / "negative.npy", "negative.npy: -60 on average; expected counts without light, 0 or more"),
+        ("0.004", "the dark level is below 1 and the photograph counts to 65535; expected its counts"),
         (tmp_path / "lossy.jpg", "lossy.jpg: compressed with loss"),
         (tmp_path / "none.npy", "no such file; expected counts without light"),
         ("-3", "0 or more, or a file"),
@@ -56,6 +59,14 @@ def test_dark_counts_that_do_not_fit_are_refused_in_one_line(tmp_path: Path) -> 
         with pytest.raises(UserError, match=line) as caught:
             given_dark(str(given))[0].off(COUNTS)
         assert "\n" not in str(caught.value)
+
+
+def test_a_part_of_a_count_is_dark_enough_for_8_bits_and_noise_around_zero_for_any(tmp_path: Path) -> None:
+    counts = COUNTS.astype(np.uint8)
+    assert np.array_equal(given_dark("0.5")[0].off(counts), counts - 0.5)
+    noise = np.random.default_rng(1).normal(-0.1, 2, COUNTS.shape)
+    np.save(tmp_path / "noise.npy", noise)
+    assert np.allclose(given_dark(str(tmp_path / "noise.npy"))[0].off(COUNTS), COUNTS - noise)
 
 
 def test_a_bench_file_names_a_level_or_a_file_beside_it_and_another_file_is_another_bench(tmp_path: Path) -> None:

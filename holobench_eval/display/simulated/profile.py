@@ -150,18 +150,23 @@ class Profile:
         Raises
         ------
         UserError
-            A side below 64 or above 8192 pixels; a panel with maps on another size than its own.
+            A side below 64 or above 8192 pixels; rows and columns in the other order; a panel with maps on another size
+            than its own.
         """
         if shape is None:
             return self
         if min(shape) < SMALLEST_PANEL or max(shape) > LARGEST_PANEL:
             raise UserError(f"a panel has {SMALLEST_PANEL} to {LARGEST_PANEL} pixels a side, got {list(shape)}")
-        rows, columns = (min(given, own) for given, own in zip(shape, self.panel.shape, strict=True))
-        if (rows, columns) == self.panel.shape:
+        own = self.panel.shape
+        if tuple(shape) == own[::-1] != own:
+            sides = f"{own[0]} rows and {own[1]} columns"
+            raise UserError(f"'{self.name}' has {sides}; rows come first: {list(own)}, not {list(shape)}")
+        rows, columns = (min(given, side) for given, side in zip(shape, own, strict=True))
+        if (rows, columns) == own:
             return self
         if self.held:
-            own = f"{self.panel.shape[0]} x {self.panel.shape[1]}"
-            raise UserError(f"'{self.name}' has maps of its panel of {own} pixels; give that panel, not {list(shape)}")
+            size = f"{own[0]} x {own[1]}"
+            raise UserError(f"'{self.name}' has maps of its panel of {size} pixels; give that panel, not {list(shape)}")
         distance = self.panel.distance * rows / self.panel.shape[0]
         return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
 

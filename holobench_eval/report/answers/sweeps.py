@@ -40,9 +40,15 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def _followed(results: Results, before: str) -> list[str]:
-    """The methods of the question, and the best before the change, if there are any of those that solve before it."""
-    best = [results.ranking(before, categories=categories)[:1] for categories in (OFFLINE, (ONLINE,))]
-    return list(dict.fromkeys([*subjects(results), *(best[0] or best[1])]))
+    """The methods of the question, and the best before the change, if there are any of those that solve before it.
+
+    Where that is the baseline alone, also the next.
+    """
+    ranked = [results.ranking(before, categories=categories) for categories in (OFFLINE, (ONLINE,))]
+    best, baseline = (ranked[0] or ranked[1])[:1], results.layout.baseline
+    followed = list(dict.fromkeys([*subjects(results), *best]))
+    others = [label for label in (*ranked[0], *ranked[1]) if label != baseline]
+    return [*followed, *others[:1]] if followed == [baseline] else followed
 
 
 def _costs(here: list[Sweep], label: str) -> Iterator[str]:

@@ -186,6 +186,8 @@ def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wrong")
     np.save(folder / "small.npy", PHASE[:, 1:])
     np.save(folder / "byte.npy", LEVELS)
+    np.save(folder / "radians.npy", PHASE[0])
+    np.save(folder / "turns.npy", PHASE[0] / math.tau)
     np.save(folder / "complex.npy", np.exp(1j * PHASE))
     np.save(folder / "int.npy", LEVELS.astype(np.int64))
     np.save(folder / "float.npy", LEVELS.astype(np.float64))
@@ -240,6 +242,14 @@ def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("complex.npy", {"two_pi_level": 256}, "two_pi_level is set, but complex128 holds a field, not levels"),
         ("byte.npy", {"two_pi_level": [256, 250]}, "two_pi_level: 2 levels for 3 colours; expected one for all, or"),
         ("byte.npy", {"correction": {"file": "gone.bmp"}}, "gone.bmp: no such file"),
+        *(
+            (
+                "byte.npy",
+                {"correction": {"file": f"FOLDER/{unit}.npy"}},
+                "as radians or turns; a correction holds levels",
+            )
+            for unit in ("radians", "turns")
+        ),
         ("byte.npy", {"correction": {"file": "FOLDER/small.npy"}}, "of 3 x 11 x 12 levels; .* 12 x 12 pixels"),
         ("nan.npy", {}, "NaN or infinite"),
         ("objects.npy", {}, "damaged, or no .npy file: Object arrays cannot be loaded"),

@@ -272,6 +272,14 @@ def test_a_sweep_says_the_worst_loss_and_whether_a_lead_stays() -> None:
     )
 
 
+def test_a_sweep_whose_baseline_is_best_tells_of_another_method_too() -> None:
+    without = tuple(swept for swept in sweeps.layout().sweeps if "eye" not in swept.kind)
+    best, other = answer(sweep(sweeps=without, baseline="HIL")).splitlines()
+    assert best.startswith("HIL loses at most +9.00 dB")
+    assert other.startswith("Wirtinger loses at most +0.00 dB")
+    assert other.endswith("with no lead over HIL before (-4.00 dB).")
+
+
 def test_a_claim_is_judged_as_far_as_it_goes() -> None:
     whole = answer(claimed(Claim("Nothing happens")))
     assert '"Nothing happens" does not hold for HIL: it loses at most +9.00 dB' in whole
