@@ -22,6 +22,8 @@ BEYOND = (
     ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n"),
     ("profiles: [ideal]\n", "profiles: [absent.yaml]\n"),
     ("panel: [128, 256]", "panel: [64, 64]"),
+    ("panel: [128, 256]", "panel: [1920, 1080]"),
+    ('label: "GS"', "label: floor"),
     ("sets.py:Images", "sets.py:Training"),
     ("sets.py:Images", "gone.py:Images"),
     ("count: 3", "cuont: 3"),
