@@ -31,10 +31,10 @@ class LightFields:
     The eye focuses on the image distance of the panel. scenes: ``shapes`` and ``shapes-2``, ``shapes-3`` ... places:
     where the pupil is when a hologram is scored, sideways from the axis in radii of the iris, positive to the right;
     given: where it is in the views that methods are given, by default such that each scored place lies halfway between
-    two of these, where nothing holds a picture. near, far: where the two ends of a
-    scene's depth lie, in mm from the image distance of the full panel; positive is nearer to the viewer. blur: as in
-    ``focal_stacks``, of the whole iris, of which the pupil has half the diameter. While the pupil moves by a radius of
-    the iris, a thing 1 mm away moves by half of ``blur``, that of green light for all colours.
+    two of these, where nothing holds a picture. near, far: where the two ends of a scene's depth lie, in mm from the
+    image distance of the full panel; positive is nearer to the viewer. blur: as in ``focal_stacks``, of the whole iris,
+    of which the pupil has half the diameter. While the pupil moves by a radius of the iris, a thing 1 mm away moves by
+    half of ``blur``, that of green light for all colours.
     """
 
     scenes: Annotated[tuple[str, ...], MinLen(1)] = (GENERATED,)
@@ -49,8 +49,8 @@ class LightFields:
     def __post_init__(self) -> None:
         """UserError for a repeated scene or place, one that is not drawn, and for a depth without extent."""
         refuse_repeats("scene", self.scenes, "scenes")
-        refuse_repeats("place", self.places, "places")
-        refuse_repeats("place", self.given, "given")
+        for field, places in (("places", self.places), ("given", self.given)):
+            refuse_repeats("place", [f"{place:g}" for place in places], field)  # as items are named
         if other := [scene for scene in self.scenes if not generated(scene)]:
             raise UserError(f"scene '{other[0]}' has one view; allowed: {GENERATED}, {GENERATED}-2, {GENERATED}-3 ...")
         if self.near <= self.far:

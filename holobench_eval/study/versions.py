@@ -22,7 +22,7 @@ HARNESS = "4: scattered light taken off before registration"
 # How photographs of a display that exists are scored, beside HARNESS: one new text for a real display's cells alone.
 PHOTOGRAPHS = "means over the target's pixels"
 # The alignment of a photograph with its target without fiducials (``holoeval score``).
-ALIGNMENT = "levels are counted where a capture shows its target"
+ALIGNMENT = "captures whose red and blue are exchanged have no score"
 
 AGAIN = "has changed since the study was planned; start the run again"
 

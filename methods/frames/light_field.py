@@ -59,22 +59,8 @@ class LightField(FromRandomFrames):
         return self._light_field_loss(target.expand(len(places), *target.shape), places, bench, channel)
 
     def solve_views(self, targets: Tensor, places: Sequence[float], bench: Bench) -> Tensor:
-        """One hologram for several views.
-
-        Parameters
-        ----------
-        targets : Tensor
-            Linear intensities ``(V, C, h, w)`` in [0, 1].
-        places : sequence of float
-            Of the eye's pupil that sees them, sideways from the axis [radii of the iris].
-        bench : Bench
-            Nominal optics in SI units, and named random numbers.
-
-        Returns
-        -------
-        Tensor
-            Phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad].
-        """
+        """Linear intensities ``(V, C, h, w)`` in [0, 1], seen by a pupil at places sideways from the axis [radii of the
+        iris], to a phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad]."""
         solved = []
         for channel, views in enumerate(targets.unbind(1)):
             loss = self._light_field_loss(views[:, None], [(0.0, place) for place in places], bench, channel)

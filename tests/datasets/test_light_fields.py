@@ -75,7 +75,7 @@ def centroid(image: Tensor) -> float:
     ("change", "words"),
     [
         ({"scenes": ("motorcycle",)}, "scene 'motorcycle' has one view; allowed: shapes, shapes-2, shapes-3 ..."),
-        ({"places": (0.5, 0.5)}, "place '0.5' is given twice"),
+        ({"places": (0.5, 0.5000001)}, "place '0.5' is given twice"),
         ({"near": -10.0}, "near is to be larger than far"),
     ],
 )

@@ -8,6 +8,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import Task, plan
 
 MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
 
@@ -47,3 +48,11 @@ def assert_refused(config: Path, message: str) -> None:
         load_study(config)
     assert str(refused.value).startswith(f"{config}:{message}")
     assert "\n" not in str(refused.value)
+
+
+def tasks_of(config: Path) -> dict[str, list[Task]]:
+    """The tasks of every method of a study, by its label."""
+    tasks: dict[str, list[Task]] = {}
+    for task in plan(load_study(config)).tasks:
+        tasks.setdefault(task.label, []).append(task)
+    return tasks

@@ -13,7 +13,7 @@ from holobench_eval.metrics import score
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE, Task, plan
 from holobench_eval.study.scoring.scores import in_focus
-from tests.study.studies import assert_refused, exchanged
+from tests.study.studies import assert_refused, exchanged, tasks_of
 from tests.support.trained_study import compute
 
 CONFIG = """\
@@ -57,10 +57,7 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def solutions(folder: Path, *changes: tuple[str, str]) -> dict[str, list[Task]]:
     """The tasks of every method."""
-    tasks: dict[str, list[Task]] = {}
-    for task in plan(load_study(write(folder, *changes))).tasks:
-        tasks.setdefault(task.label, []).append(task)
-    return tasks
+    return tasks_of(write(folder, *changes))
 
 
 TWO_SCENES = ("{planes:", "{scenes: [shapes, shapes-2], planes:")

@@ -8,8 +8,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Task, plan
-from tests.study.studies import assert_refused, exchanged
+from holobench_eval.study.plan import Task
+from tests.study.studies import assert_refused, exchanged, tasks_of
 from tests.support.trained_study import compute
 
 CONFIG = """\
@@ -36,10 +36,7 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def solutions(folder: Path, *changes: tuple[str, str]) -> dict[str, list[Task]]:
     """The tasks of every method."""
-    tasks: dict[str, list[Task]] = {}
-    for task in plan(load_study(write(folder, *changes))).tasks:
-        tasks.setdefault(task.label, []).append(task)
-    return tasks
+    return tasks_of(write(folder, *changes))
 
 
 def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path: Path) -> None:

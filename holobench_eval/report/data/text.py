@@ -152,9 +152,10 @@ FOCUS = Text(
 VIEWS = Text(
     procedure=(
         "The targets are light fields: what an eye sees of a scene with depth whose pupil is at one place of the "
-        "eyebox after another. A method makes one hologram of a scene: from all views, or, if it knows of none, from "
-        "the view nearest to the axis. The display shows it to a pupil at each place; the capture is matched in "
-        "intensity and scored against the view from there."
+        "eyebox after another. A method makes one hologram of a scene: from all views that it is given, or, if it "
+        "knows of none, from the one nearest to the axis. The display shows it to a pupil at each scored place, which "
+        "may lie between those of given views; the capture is matched in intensity and scored against the view from "
+        "there."
     ),
     caution="Views of one scene are not independent: intervals and tests are over scenes.",
     picture="Each capture is what the eye sees from the place of its target, matched in intensity and sRGB-encoded",

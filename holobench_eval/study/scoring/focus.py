@@ -40,7 +40,8 @@ def views(job: Job) -> Measured:
     own, display = job.task.cells[0], job.task.conditions[0].nominal
     dataset = plugins.build("datasets", own.dataset, dict(own.dataset_params), job.setting.folder)
     given = given_views(dataset, own.target)
-    cells = [replace(own, target=name, target_sha256=sha256) for name, sha256, _ in given]
+    cells = tuple(replace(own, target=name, target_sha256=sha256) for name, sha256, _ in given)
+    solving = replace(job, task=replace(job.task, cells=cells, conditions=(display,) * len(cells)))
     pictures = torch.stack([job.target(cell, display) for cell in cells])
 
     def solve(method: Any, handle: MeteredDisplay) -> Any:
@@ -49,7 +50,7 @@ def views(job: Job) -> Measured:
         places = [place for *_, place in given]
         return _alone(job, "solve_views", method.solve_views(pictures.to(job.device, copy=True), places, handle))
 
-    solved = solution(job, display, pictures[0], solve, cells[0])
+    solved = solution(solving, display, pictures[0], solve)
     return lambda cell, shown_on: captured(job, solved, cell, shown_on, job.target(cell, shown_on))
 
 

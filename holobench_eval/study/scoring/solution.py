@@ -18,7 +18,6 @@ from .. import cost, identity, isolation
 from ..displays import Condition
 from ..isolation.read_files import digests
 from ..phases import Solution, Starts
-from ..plan import Cell
 from ..versions import gate
 from . import starts
 from .job import Job
@@ -26,21 +25,20 @@ from .job import Job
 Solve = Callable[[Any, MeteredDisplay], Any]  # calls a method with its handle of the display
 
 
-def solution(job: Job, display: Condition, target: Tensor, solve: Solve, cell: Cell | None = None) -> Solution:
+def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solution:
     """The solution of a task: kept from before, or what its method finds by ``solve`` on a display.
 
-    target: ``(C, h, w)``, which the display is exposed for; cell: whose target it is (None: the task's first). The
-    method works on a copy, so its changes cannot reach the score. Its inputs are on the job's device; its phase returns
-    to the CPU.
+    target: ``(C, h, w)``, which the display is exposed for. The method works on a copy, so its changes cannot reach
+    the score. Its inputs are on the job's device; its phase returns to the CPU.
     """
-    first = cell or job.task.cells[0]
+    first = job.task.cells[0]
     takes_captures = isolation.traits(first.method, job.setting.folder).camera
     with job.phases.locked(first.phase_id) if takes_captures else nullcontext():
-        return _solution(job, first, display, target, solve)
+        return _solution(job, display, target, solve)
 
 
-def _solution(job: Job, first: Cell, display: Condition, target: Tensor, solve: Solve) -> Solution:
-    task = job.task
+def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solution:
+    task, first = job.task, job.task.cells[0]
     learned = job.learned(task.preparation)
     others = starts.of(job, first)
     # A start has the same name after another training, so what it is counts too.
