@@ -2,9 +2,6 @@
 
 import signal
 from collections.abc import Iterator
-from copy import deepcopy
-from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import matplotlib
@@ -13,7 +10,6 @@ import torch
 from hypothesis import settings
 
 from holobench_eval.commands import run as run_command
-from holobench_eval.core import yaml_source
 from holobench_eval.study.scoring import reference
 from tests.support import fake_study
 
@@ -51,20 +47,6 @@ def _no_stage_sheets() -> Iterator[None]:
     """They take seconds for each display of each run; tests that look at them ask for `stage_sheets`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_command, "sheets", lambda *_: [])
-        yield
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _files_parsed_once() -> Iterator[None]:
-    """A study reads each profile for each of its methods, and many tests read the same ones."""
-    parsed = lru_cache(maxsize=256)(yaml_source.parse)
-
-    def parse(name: str, text: str) -> yaml_source.Document:
-        found = parsed(name, text)
-        return replace(found, data=deepcopy(found.data), keys=dict(found.keys), values=dict(found.values), options={})
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml_source, "parse", parse)
         yield
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -96,8 +97,9 @@ def _read(path: Path) -> str:
         ) from error
 
 
+@lru_cache(maxsize=128)  # one study names a profile in many places, and a family of profiles shares its base
 def parse(name: str, text: str) -> Document:
-    """The document in a text; ``name`` is used in error lines."""
+    """The document in a text, which callers do not change; ``name`` is used in error lines."""
     reader = _Reader(name)
     try:
         root = _Loader(text).get_single_node()

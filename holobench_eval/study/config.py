@@ -14,6 +14,7 @@ from ..core import plugins
 from ..core.errors import UserError, suggest
 from ..core.schema import placed, typed
 from ..core.yaml_source import Document, Keys, load
+from ..display import DisplaySpec
 from ..display.simulated.changes import KINDS, Value, altered, checked
 from ..display.simulated.profile import load_profile
 from ..display.traits import refuse_plane, traits_of
@@ -23,7 +24,7 @@ from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
 from .definition import PREDICTIONS, STACKS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
-from .displays import Condition, condition, displays, real_condition
+from .displays import condition, displays, real_condition
 from .identity import SPECKLE
 from .plan import FLOORS, REFERENCE, is_reference
 from .stacks import SCORES, stacks_of
@@ -64,8 +65,8 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
-    _check_profiles(study, document)
-    study = replace(study, methods=tuple(_entry(study, document, entry) for entry in study.methods))
+    specs = _specs(study, document)
+    study = replace(study, methods=tuple(_entry(study, document, entry, specs) for entry in study.methods))
     study = replace(study, sweeps=tuple(_sweeps(study, document)))
     _check_labels(study, document)
     _check_metrics(study, document)
@@ -182,14 +183,16 @@ def _protocol(study: Study, document: Document) -> Protocol:
     return replace(study.protocol, lpips_weights=str(weights))
 
 
-def _check_profiles(study: Study, document: Document) -> None:
-    seen = {REFERENCE: "the floor rows"}
+def _specs(study: Study, document: Document) -> dict[str, DisplaySpec]:
+    """The nominal optics of each display, by its name in the config. UserError: a display that has no place in it."""
+    seen, specs = {REFERENCE: "the floor rows"}, dict[str, DisplaySpec]()
     learned, bench, panel = study.display.learned, study.display.bench, study.display.panel
-    for index, profile in enumerate([learned.profile] if learned else study.display.sources):
+    for index, source in enumerate(study.display.sources):
+        profile = learned.profile if learned else source
         where: Keys = ("display", "bench") if bench else ("display", "profiles", index)
         where = ("display", "learned", "profile") if learned else where
         with placed(document, where, where):
-            display = _condition(study, profile)
+            display = real_condition(bench, study.folder) if bench else condition(profile, panel, study.folder)
             if (taken := REFERENCE if is_reference(display.name) else display.name) in seen:
                 both = f"'{profile}' and '{seen[taken]}' are both named '{display.name}'"
                 raise UserError(f"{both}; list each display once")
@@ -205,14 +208,8 @@ def _check_profiles(study: Study, document: Document) -> None:
             if panel and not bench and min(load_profile(profile, study.folder).spec().region.shape) >= SMALLEST_REGION:
                 message += f", which a panel of {list(_smallest_panel(profile, panel, study.folder))} has"
             raise document.error(("display", "panel"), message)
-        seen[name] = profile
-
-
-def _condition(study: Study, source: str) -> Condition:
-    bench, learned = study.display.bench, study.display.learned
-    if bench:
-        return real_condition(bench, study.folder)
-    return condition(learned.profile if learned else source, study.display.panel, study.folder)
+        seen[name], specs[source] = profile, display.spec
+    return specs
 
 
 def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[int, int]:
@@ -223,7 +220,7 @@ def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[
     return max(panel[0], side), max(panel[1], side)
 
 
-def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
+def _entry(study: Study, document: Document, entry: MethodEntry, specs: Mapping[str, DisplaySpec]) -> MethodEntry:
     where = ("methods", entry.row)
     with placed(document, (*where, "name"), (*where, "params"), (*where, "grid")):
         method = isolation.build(entry.name, entry.params, study.folder)
@@ -244,10 +241,9 @@ def _entry(study: Study, document: Document, entry: MethodEntry) -> MethodEntry:
     profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
     with placed(document, (*where, "name"), (*where, "name")):
         for source in profiles:
-            spec = _condition(study, source).spec
-            refuse_plane(traits, entry.name, spec)
+            refuse_plane(traits, entry.name, specs[source])
             if hasattr(method, "refuse_display"):
-                method.refuse_display(spec)
+                method.refuse_display(specs[source])
     return replace(entry, params=isolation.params_of(method), profiles=profiles)
 
 
@@ -271,7 +267,7 @@ def _check_labels(study: Study, document: Document) -> None:
             if measured[index] == measured[earlier] and set(entry.profiles) & set(other.profiles):
                 message = f"methods[{entry.row}] has the method, parameters and display of '{other.label}'; remove one"
                 raise document.error(where[:2], message)
-    named: dict[Keys, str] = {("baseline",): study.baseline, ("second_baseline",): study.second_baseline}
+    named: dict[Keys, str] = {("baseline",): study.baseline}
     named |= {("reported", "rows", label): label for label in (study.reported.rows if study.reported else ())}
     for place, label in named.items():
         if label:

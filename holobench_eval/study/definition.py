@@ -235,8 +235,7 @@ class Study:
     seed: of all random numbers; repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a
     solution's seconds beside other workers, ``alone`` those of one solution a row with nothing beside it; protocol: how
     captures are scored; baseline: label that paired tests compare against (empty: that of the first method);
-    second_baseline: label of another one that differences are also given to (empty: none); headline: the column that
-    the report leads with, a metric and a domain; save: what else is written beside the scores.
+    headline: the column that the report leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same
@@ -261,7 +260,6 @@ class Study:
     timing: Literal["shared", "alone"] = "shared"
     protocol: Protocol = Protocol()
     baseline: str = ""
-    second_baseline: str = ""
     headline: Text = "psnr_linear"
     save: Save = Save()
     isolation: Isolation = "files"
@@ -324,8 +322,8 @@ class Study:
         """The study with some of its methods; what it says of the others goes with them."""
         kept = tuple(methods)
         gone = {*self.labels} - {entry.label for entry in kept}
-        baseline, second = ("" if label in gone else label for label in (self.baseline, self.second_baseline))
+        baseline = "" if self.baseline in gone else self.baseline
         rows = self.reported.rows if self.reported else {}
         rows = {label: row for label, row in rows.items() if label not in gone}
         reported = self.reported and replace(self.reported, rows=rows)
-        return replace(self, methods=kept, baseline=baseline, second_baseline=second, reported=reported)
+        return replace(self, methods=kept, baseline=baseline, reported=reported)

@@ -79,8 +79,7 @@ class Layout:
 
     pairs: (method label, condition) of every planned row, in the order of the config: methods, then conditions.
     targets: what every pair is measured on, in the order of the dataset; seed: of the study.
-    baseline: label that every method is tested against (None: no such tests); second_baseline: label of another row
-    that differences are given to (None: there is none).
+    baseline: label that every method is tested against (None: no such tests).
     headline: score key of the headline metric, such as ``psnr_linear``.
     privileged: labels of methods that may differentiate through the bench; they are oracles, not competitors.
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
@@ -112,7 +111,6 @@ class Layout:
     seed: int = 0
     headline: str = "psnr_linear"
     baseline: str | None = None
-    second_baseline: str | None = None
     privileged: frozenset[str] = frozenset()
     reported: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     reported_source: str = ""
@@ -234,7 +232,6 @@ def layout_of(study: Study) -> Layout:
         seed=study.seed,
         headline=study.headline,
         baseline=study.baseline,
-        second_baseline=study.second_baseline or None,
         privileged=frozenset(label for label, method in traits.items() if method.privileged),
         reported=reported.rows if reported else {},
         reported_source=reported.source if reported else "",
