@@ -10,6 +10,7 @@ from ..data.phrases import verdict
 from ..data.text import FILES, number, words
 from ..markdown import Markdown, blocks, code, heading, table
 
+PANEL_TIME, MEMORY = "panel time [frames]", "memory [MiB]"
 SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
 
 
@@ -28,7 +29,9 @@ def display_table(board: Board, display: Display) -> Markdown:
     columns = ["", "method", score.heading]
     columns += [f"against {layout.baseline}{score.brackets}"] * bool(layout.baseline)
     columns += [each.name for each in board.beside]
-    costs = [*(["photographs"] * layout.spends_captures), *(["seconds"] * (layout.measure != FILES))]
+    costs = ["photographs"] * layout.spends_captures
+    costs += [PANEL_TIME] * any(row.panel_time is not None for row in display.rows)
+    costs += ["seconds", MEMORY] * (layout.measure != FILES)
     lines: list[list[object]] = []
     for group, rows in display.groups:
         name = Markdown("**{}**").format(GROUPS[group])
@@ -51,7 +54,7 @@ def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) ->
     elif tested:
         line.append("baseline" if row.label == results.layout.baseline else "–")
     line += [each.number(value) for each, value in zip(board.beside, row.beside, strict=True)]
-    known = {"photographs": row.photographs, "seconds": row.seconds}
+    known = {"photographs": row.photographs, PANEL_TIME: row.panel_time, "seconds": row.seconds, MEMORY: row.memory}
     return line + [number(math.nan if (value := known[cost]) is None else value) for cost in costs]
 
 

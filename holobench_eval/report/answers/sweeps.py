@@ -72,17 +72,23 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
 
 
 def _seen(here: list[Sweep]) -> Iterator[str]:
-    """The best method for an eye whose pupil is at each place, and what it gains there over the baseline."""
+    """The best method for an eye whose pupil is at each place, and all others whose interval is above the baseline."""
     for sweep in (sweep for sweep in here if sweep.swept.kind == "eye_pupil"):
         score, baseline, parts = sweep.results.headline, sweep.results.layout.baseline, list[str]()
         for place, name in sweep.swept.points:
             rivals = [label for label in sweep.methods if label != baseline]
             gains = {label: gain for label in rivals if (gain := sweep.gain(label, name)) is not None}
-            if gains:
-                best = max(gains, key=lambda label: gains[label].mean)
-                parts.append(f"{place} {best} {difference(score, gains[best])}")
+            ranked = sorted(gains, key=lambda label: -gains[label].mean)
+            above = [
+                f"{label} {score.with_unit(gains[label].mean, signed=True)}"
+                for label in ranked[1:]
+                if gains[label].low > 0
+            ]
+            if ranked:
+                parts.append(f"{place} {', '.join([f'{ranked[0]} {difference(score, gains[ranked[0]])}', *above])}")
         if parts:
-            yield f"best for an eye against {baseline}, by place of its pupil in radii of the iris: {', '.join(parts)}"
+            told = "best for an eye, and what else is above"
+            yield f"{told} {baseline}, by place of its pupil in radii of the iris: {'; '.join(parts)}"
 
 
 def _ranges(here: list[Sweep]) -> Iterator[str]:

@@ -39,8 +39,9 @@ class Row:
 
     tier: its letter (empty: a target is missing, there is no test, or it is an oracle); score: mean of the headline
     with its interval; scored: of how many targets; test: against the baseline (None: it is the baseline, or lacks a
-    target); beside: means of other scores; photographs: in total, those of its training included (None: unknown);
-    seconds: of one hologram (None: unknown); marks: what must be known of it.
+    target); beside: means of other scores; photographs: in total, those of its training included; panel_time: frames
+    shown for a picture, photographs included (None: holograms have one frame each); seconds, memory: of one hologram,
+    memory in MiB (None: unknown); marks: what must be known of it.
     """
 
     label: str
@@ -50,7 +51,9 @@ class Row:
     test: PairedTest | None
     beside: tuple[float, ...]
     photographs: float | None
+    panel_time: float | None
     seconds: float | None
+    memory: float | None
     marks: tuple[str, ...]
 
 
@@ -113,7 +116,9 @@ class Board:
             "verdict": verdict(self.results.headline, row.test) if row.test else None,
             "beside": {score.key: to_json(value) for score, value in zip(self.beside, row.beside, strict=True)},
             "photographs": to_json(row.photographs),
+            "panel_time": to_json(row.panel_time),
             "seconds": to_json(row.seconds),
+            "memory_mib": to_json(row.memory),
             "marks": list(row.marks),
         }
 
@@ -150,7 +155,9 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
             tested(results, label, condition),
             tuple(float(row[score.column]) for score in beside),
             _known(row, "total_captures"),
+            _known(row, "panel_time"),
             _known(row, "solving_s"),
+            _known(row, "memory_mib"),
             (
                 *marks(results, label, condition),
                 *(["no better than gray"] * _is_gray(results, label, condition, floor)),
