@@ -235,7 +235,8 @@ class Study:
     seed: of all random numbers; repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a
     solution's seconds beside other workers, ``alone`` those of one solution a row with nothing beside it; protocol: how
     captures are scored; baseline: label that paired tests compare against (empty: that of the first method);
-    headline: the column that the report leads with, a metric and a domain; save: what else is written beside the scores.
+    headline: the column that the report leads with, a metric and a domain; save: what else is written beside the
+    scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same
