@@ -11,18 +11,23 @@ from peers import OF_JAX, PEERS
 from scene import SHRINK, THREADS, Scene
 from steps import BARE, OURS, STEPS
 
+from holobench_eval.core import plugins
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.methods.common import unit_field
 from holobench_eval.methods.hil.networks import Network
+from holobench_eval.methods.learned.weights import seeded
+from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.study import plan
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.progress import watching
 from holobench_eval.study.run import run
+from tests.support.open_loop import Bench
 
 PAPER = (1080, 1920)
+ONE_PASS = ("tensor_holography", "unet_phase", "holonet", "ccnn")
 DISTANCES = (0.02, 0.1, 0.2)
 COMPARED = [Scene(PAPER, distance) for distance in DISTANCES]
 SIZES = [Scene(panel, distance) for panel in ((256, 256), (540, 960), PAPER, (2160, 3840)) for distance in DISTANCES]
@@ -200,6 +205,31 @@ def network(backward):
     return make
 
 
+def colours(scene):
+    """The nominal optics of a display in three colours, and a target ``(C, h, w)``."""
+    spec = load_profile("ideal").scaled(scene.panel).spec()
+    return spec, torch.rand(3, *spec.region.shape, generator=torch.Generator().manual_seed(1))
+
+
+def one_pass(method):
+    def make(scene):
+        spec, target = colours(scene)
+        with seeded("benchmark", 1):
+            model = method.network(spec)
+        return Work(torch.no_grad()(lambda: method._phase(model, spec, target)))
+
+    return make
+
+
+def steps(count):
+    def make(scene):
+        spec, target = colours(scene)
+        method = Wirtinger(iterations=count, initial_phase="dpe", step=0.03)
+        return Work(lambda: method.solve(target[None], Bench(spec)))
+
+    return make
+
+
 def study(scene):
     """A study, from its plan to its last record, in a folder of its own each time."""
     from rich.console import Console
@@ -249,6 +279,12 @@ CASES = [
         "approximator, preset small",
         [Scene((256, 256), 0.1)],
         {"forward": network(False), "forward and backward": network(True)},
+    ),
+    *of_scenes(
+        "hologram in three colours",
+        AT_100_MM,
+        {name: one_pass(plugins.build("methods", name, {})) for name in ONE_PASS}
+        | {f"{count} steps from a double phase": steps(count) for count in (5, 20)},
     ),
     *(Case("study", name, study, scene) for name, scene in STUDIES.items()),
 ]
