@@ -108,7 +108,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     fits = [(fit, pose) for pose, fit in as_given.items()]
     for how, values in {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}.items():
         fits += _fits_of(how, values, target, spec)
-    for how, scale in _scales(low, high).items():
+    for how, scale in _scales(phase).items():
         # An amplitude, or the magnitude of a phase, is somewhat like its target in any unit; the right unit is more.
         fits += [each for each in _fits_of(how, scale * phase, target, spec) if each[0] >= RIGHT]
     best, how = max(fits, key=lambda each: each[0] - TIE * each[1].startswith(FACTOR))
@@ -123,12 +123,21 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     return ""
 
 
-def _scales(low: float, high: float) -> dict[str, float]:
-    """What makes radians of values in so wide a range: of those in another unit, and of others that fill a turn."""
+def _scales(phase: Tensor) -> dict[str, float | Tensor]:
+    """What makes radians of values in so wide a range: of those in another unit, and of others that fill a turn, in all
+    colours together or in each, ``(C, 1, 1)``."""
+    low, high = (float(value) for value in phase.aminmax())
     within = [UNITS[first, last] for first, last in UNITS if first <= low and high <= last]
-    scales = {f"read as {unit.partition(' or ')[0]}": scale for unit, scale in within}
+    scales: dict[str, float | Tensor] = {f"read as {unit.partition(' or ')[0]}": scale for unit, scale in within}
     factor = math.tau / (high - low)
-    return scales if abs(factor - 1) < EDGE else {**scales, f"{FACTOR} {factor:.3g}": factor}
+    if abs(factor - 1) >= EDGE:
+        scales[f"{FACTOR} {factor:.3g}"] = factor
+    colours = phase.movedim(-3, 0).flatten(1)
+    factors = math.tau / (colours.amax(1) - colours.amin(1)).clamp_min(1e-6)
+    if float((factors - 1).abs().max()) >= EDGE and float(factors.max() / factors.min() - 1) >= EDGE:
+        each = ", ".join(f"{value:.3g}" for value in factors.tolist())
+        scales[f"{FACTOR} {each}, colour by colour, as by another two_pi_level"] = factors[:, None, None]
+    return scales
 
 
 def _fits_of(how: str, phase: Tensor, target: Tensor, spec: DisplaySpec) -> list[tuple[float, str]]:

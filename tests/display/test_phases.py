@@ -28,6 +28,11 @@ FEW = {"iterations": 30}
 OPEN = {"double_phase": {}, "double_phase_aa": {}, "double_phase_bl": {}, "gerchberg_saxton": {}, "hio": {}}
 OPEN |= {"wirtinger": FEW, "sgd": FEW, "multi_plane": FEW}
 
+
+def by_colour(phase: Tensor, *factors: float) -> Tensor:
+    return torch.tensor(factors)[:, None, None] * phase
+
+
 DEGREES, LEVELS, DRAW = np.degrees(1.0), 255.99 / TAU, torch.Generator()
 ODD = {
     "the other sign": (lambda phase: -phase, "fits its target better with the opposite sign (correlation"),
@@ -52,6 +57,14 @@ ODD = {
     "a ninth": (lambda phase: phase / 9, "better multiplied by 9"),
     "levels of 10 bits in a file of 16": (lambda phase: 2**-6 * phase, "better multiplied by 6"),
     "ten times": (lambda phase: 10 * phase, "better multiplied by 0.1"),
+    "no turn of each colour": (
+        lambda phase: by_colour(phase, 200 / 256, 160 / 256, 128 / 256),
+        "multiplied by 1.28, 1.6, 2, colour by colour",
+    ),
+    "turns of red and blue": (
+        lambda phase: by_colour(phase, 220 / 150, 1.0, 150 / 220),
+        "by another two_pi_level (corr",
+    ),
     "noise": (lambda phase: 6 * torch.rand(phase.shape, generator=DRAW.manual_seed(1)), "makes nothing like"),
 }
 
