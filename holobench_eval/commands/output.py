@@ -104,7 +104,7 @@ def board_of(drawn: Board, display: Display) -> Table:
             cells = [row.tier, f"{named}{lacks}", score.number(row.score.mean)]
             if results.layout.baseline:
                 cells.append(score.estimate(row.test.estimate, signed=True) if row.test else "")
-            cells += [number(row.photographs or 0)] if spends else []
+            cells += ["–" if row.photographs is None else number(row.photographs)] if spends else []
             table.add_row(*map(escape, cells))
     return table
 
@@ -116,8 +116,9 @@ def print_answer(console: Console, results: Results) -> None:
     is worse than a constant image has a rank, too.
     """
     from ..report.answers import kind_of
+    from ..report.data.phrases import too_few
 
-    for sentence in kind_of(results).answer(results):
+    for sentence in (*kind_of(results).answer(results), *filter(None, [too_few(results)])):
         console.print(f"- {sentence}", markup=False, highlight=False)
 
 

@@ -192,7 +192,7 @@ def table(study: Study, rows: list[Row]) -> Table:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
         result.add_column("displays" if name == "conditions" else name, justify="right", footer=total)
     result.add_column("photos", justify="right")
-    result.caption = "photos: at most, in total on each display; ?: known once it is trained"
+    result.caption = "photos: at most, in total on each display; ?: known once it is trained, or has solved"
     timed = [row.seconds for row in rows if row.seconds is not None]
     untimed = any(row.seconds is None and row.label != FLOOR for row in rows)
     if timed:

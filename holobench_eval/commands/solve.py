@@ -41,6 +41,7 @@ def solve(
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
     from ..core.io import file_name
     from ..datasets.images import decode, read
+    from ..display import load_profile
     from ..study.config import load_study
     from ..study.plan import plan
     from .run import run
@@ -49,6 +50,7 @@ def solve(
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     decode(read(picture), str(picture), gray=True)  # what is wrong with it is said of the file that was named
+    load_profile(display)
     study_in = partial(_study, _entries(names, values or []), picture, display, panel)
     folder = output or next(folder for folder in _folders(picture) if _is_free(folder, picture, study_in(folder)))
     is_new, config = not folder.exists(), folder / STUDY
@@ -61,6 +63,7 @@ def solve(
         spec = plan(study).tasks[0].conditions[0].spec
         gray = " and shown in gray, by the one wavelength of the display" * (len(spec.wavelengths) == 1)
         size = "{} x {} pixels".format(*spec.shape)
+        size += f", {1e3 * spec.distance:.4g} mm from its image" * (spec.plane == "fresnel")
         print(
             f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored{gray}"
         )

@@ -89,7 +89,10 @@ def test_a_method_over_its_budget_is_stopped_by_the_display_alone_and_its_best_h
         assert (stopped["state"], stopped["captures"], stopped["scores"]) == ("done", 3, modest["scores"])
         assert stopped["stopped"] == f"{stopped['label']} has used its 3 captures"
     assert (modest["captures"], modest["stopped"]) == (3, "")
-    assert (none["state"], none["reason"]) == ("failed", "none has used its 2 captures")
+    assert (none["state"], none["reason"]) == (
+        "failed",
+        "none has used its 2 captures and kept no phase; bench.keep(phase) keeps the best so far",
+    )
     assert (lying["state"], lying.get("stopped", "")) == ("failed", "")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..data.categories import FLOOR
-from ..data.phrases import remarks, uncovered
+from ..data.phrases import remarks, too_few, uncovered
 from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, words
 from ..markdown import Markdown
@@ -44,9 +44,8 @@ def _sample(report: Report) -> Iterator[str]:
         f"kind, not with other displays{trained}."
     ]
     tests = sum(np.isfinite(test.p) for test in results.against_baseline)
-    smallest = 2.0 ** (1 - clusters)
-    if tests and smallest >= SIGNIFICANCE:
-        parts.append(f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown.")
+    if few := too_few(results):
+        parts.append(few)
     elif tests:
         parts.append(
             f"Shown: p < {SIGNIFICANCE} by sign flips, adjusted for {tests} comparison{'s' * int(tests > 1)} with "

@@ -298,11 +298,11 @@ FIGURES.append(Column("memory_mib", _MEMORY, "number", "MiB", table=median, head
 @column(FIGURES, "number", source=None, heading="captures in total")
 def total_captures(cells: Cells, name: str) -> float:
     """All captures behind the row: of the training, and of every target."""
-    done = cells.done
-    if done.empty or done["captures"].isna().all():
+    taken = cells.cells.dropna(subset="captures")  # failed cells have taken theirs, too
+    if taken.empty:
         return float("nan")
-    trained = done["training_captures"].mean() if "training_captures" in done else 0.0
-    return float(trained + done.groupby("target", sort=False)["captures"].mean().sum())  # repeats: averaged
+    trained = taken["training_captures"].mean() if "training_captures" in taken else 0.0
+    return float(trained + taken.groupby("target", sort=False)["captures"].mean().sum())  # repeats: averaged
 
 
 @column(FIGURES, "count", source=None)

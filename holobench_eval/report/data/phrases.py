@@ -17,7 +17,7 @@ from ...study.folders.files import named
 from .column import DONE
 from .results import CONSTANT, Results
 from .scores import Score
-from .statistics import Estimate, PairedTest
+from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
 from .text import words
 
 INSTALLED = frozenset({"site-packages", "dist-packages"})  # folders of packages that pip has installed
@@ -110,6 +110,16 @@ def uncovered(records: Sequence[Mapping[str, Any]]) -> str:
     parts = [f"{label} reads {named(list(names))}" for label, names in found.items() if names]
     remedy = "a change there is not noticed; keep such files beside the config, or choose another --output after it"
     return f"Not covered: {'; '.join(parts)}: {remedy}." if parts else ""
+
+
+def too_few(results: Results) -> str:
+    """That no test of two methods can show anything on so few clusters; empty where one can, and without any test."""
+    labels = {label for name in results.conditions for label in results.methods(name)}
+    clusters = len(set(results.clusters))
+    smallest = 2.0 ** (1 - clusters)
+    if len(labels) < 2 or clusters < FEWEST or smallest < SIGNIFICANCE:
+        return ""
+    return f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
 
 
 def remarks(results: Results) -> list[str]:
