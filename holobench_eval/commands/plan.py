@@ -15,6 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..core.errors import listed
+from ..core.installed import shipped_configs
 from ..core.panels import is_small
 from . import options
 from .output import console as open_console
@@ -70,7 +71,7 @@ def plan(
         console.print("No method of it was timed on this machine before; 'holoeval run' says what is left.")
     if learning:
         console.print(training_table(learning))
-        if not artifacts.is_dir():
+        if not artifacts.is_dir() and study.file in shipped_configs().values():
             console.print(
                 "A clone of the repository has what the shipped studies need in its folder artifacts; with --artifacts "
                 "FOLDER it need not be trained.",
