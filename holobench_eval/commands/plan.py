@@ -71,7 +71,7 @@ def plan(
         console.print("No method of it was timed on this machine before; 'holoeval run' says what is left.")
     if learning:
         console.print(training_table(learning))
-        if not artifacts.is_dir() and study.file in shipped_configs().values():
+        if not artifacts.is_dir() and study.file.resolve() in shipped_configs().values():
             console.print(
                 "A clone of the repository has what the shipped studies need in its folder artifacts; with --artifacts "
                 "FOLDER it need not be trained.",

@@ -21,6 +21,7 @@ FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right pha
 JUMP = 10 * math.tau  # rad between neighbours, which radians, wrapped or smooth, have no need of
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
 FACTOR = "multiplied by"
+CLOSER = 0.7  # of the lack of correlation, to which a right factor brings a phase that makes its target without it
 TIE = 0.01  # by which a factor has to fit better than a unit, which it nearly is where the values fill the unit's span
 
 UNITS = {  # what values in a span may be, and what makes radians of them
@@ -103,8 +104,10 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     low, high = (float(value) for value in phase.aminmax())
     as_given = _fits(phase, target, spec)
     own = as_given.get("", 1.0)
-    if own >= RIGHT or low == high:
+    if low == high or not as_given:
         return ""
+    if own >= RIGHT:  # a table of levels may fill no turn, and any other scale may then do a little more
+        return "" if spec.levels else _turn_doubt(phase, target, spec, own)
     fits = [(fit, pose) for pose, fit in as_given.items()]
     for how, values in {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}.items():
         fits += _fits_of(how, values, target, spec)
@@ -113,7 +116,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
         fits += [each for each in _fits_of(how, scale * phase, target, spec) if each[0] >= RIGHT]
     best, how = max(fits, key=lambda each: each[0] - TIE * each[1].startswith(FACTOR))
     if best >= own + BETTER and best >= UNLIKE:
-        return f"fits its target better {how} (correlation {best:.2f} on the nominal model; as it is, {own:.2f})"
+        return _better(how, best, own)
     correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have about 0.9"
     if _is_amplitude(phase, target, spec):
         return f"grows with the amplitude of the light that makes its target, and is not its phase ({correlation})"
@@ -124,20 +127,36 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
 
 
 def _scales(phase: Tensor) -> dict[str, float | Tensor]:
-    """What makes radians of values in so wide a range: of those in another unit, and of others that fill a turn, in all
-    colours together or in each, ``(C, 1, 1)``."""
+    """What makes radians of values in so wide a range: of those in another unit, and as by ``_turns``."""
     low, high = (float(value) for value in phase.aminmax())
     within = [UNITS[first, last] for first, last in UNITS if first <= low and high <= last]
-    scales: dict[str, float | Tensor] = {f"read as {unit.partition(' or ')[0]}": scale for unit, scale in within}
-    factor = math.tau / (high - low)
-    if abs(factor - 1) >= EDGE:
-        scales[f"{FACTOR} {factor:.3g}"] = factor
+    return {f"read as {unit.partition(' or ')[0]}": scale for unit, scale in within} | _turns(phase)
+
+
+def _turns(phase: Tensor) -> dict[str, float | Tensor]:
+    """What makes the values fill a turn, in all colours together or in each ``(C, 1, 1)`` that has any structure."""
     colours = phase.movedim(-3, 0).flatten(1)
-    factors = math.tau / (colours.amax(1) - colours.amin(1)).clamp_min(1e-6)
-    if float((factors - 1).abs().max()) >= EDGE and float(factors.max() / factors.min() - 1) >= EDGE:
+    spans, span = colours.amax(1) - colours.amin(1), float(phase.max() - phase.min())
+    scales = dict[str, float | Tensor]()
+    if abs(math.tau / span - 1) >= EDGE:
+        scales[f"{FACTOR} {math.tau / span:.3g}"] = math.tau / span
+    wide = spans >= EDGE * span
+    factors = torch.where(wide, math.tau / spans, 1.0)
+    if float(factors[wide].max() / factors[wide].min() - 1) >= EDGE:
         each = ", ".join(f"{value:.3g}" for value in factors.tolist())
         scales[f"{FACTOR} {each}, colour by colour, as by another two_pi_level"] = factors[:, None, None]
     return scales
+
+
+def _turn_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, own: float) -> str:
+    """Of a phase that makes its target, whether one that fills a turn makes it much better; empty where none does."""
+    fits = {how: _fits(scale * phase, target, spec)[""] for how, scale in _turns(phase).items()}
+    best = max(fits, key=fits.__getitem__, default="")
+    return _better(best, fits[best], own) if best and 1 - fits[best] <= CLOSER * (1 - own) else ""
+
+
+def _better(how: str, fit: float, own: float) -> str:
+    return f"fits its target better {how} (correlation {fit:.3f} on the nominal model; as it is, {own:.3f})"
 
 
 def _fits_of(how: str, phase: Tensor, target: Tensor, spec: DisplaySpec) -> list[tuple[float, str]]:

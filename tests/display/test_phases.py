@@ -99,6 +99,20 @@ def test_what_fits_better_is_named(display: hb.OpenDisplay, target: Tensor, phas
     assert remark in phase_doubt(change(phase), target, display.spec)
 
 
+@pytest.mark.parametrize("method", ["double_phase", "gerchberg_saxton", "smooth"])
+@pytest.mark.parametrize("factors", [(220 / 256, 180 / 256, 150 / 256), (220 / 150, 1.0, 150 / 220)])
+def test_a_full_turn_of_each_colour_is_named_though_the_picture_is_still_there(
+    display: hb.OpenDisplay, target: Tensor, method: str, factors: tuple[float, ...]
+) -> None:
+    smooth = {"iterations": 100, "initial_phase": "constant"}
+    known = solved(display, target, method) if method != "smooth" else None
+    right = torch.from_numpy(display.solve("wirtinger", target, **smooth)) if known is None else known
+    read = by_colour(right % TAU, *factors)
+    assert "colour by colour, as by another two_pi_level" in phase_doubt(read, target, display.spec)
+    read[2] = 1.3  # a colour that is dark has no turn
+    assert "e+0" not in phase_doubt(read, target * torch.tensor([1.0, 1.0, 0.0])[:, None, None], display.spec)
+
+
 def test_a_unit_is_named_for_values_that_do_not_fill_its_span(display: hb.OpenDisplay, target: Tensor) -> None:
     smooth = (solved(display, target, "wirtinger") % TAU).clamp(0.1 * TAU, 0.9 * TAU)
     for kind in ("turns", "levels over their number", "degrees", "levels"):

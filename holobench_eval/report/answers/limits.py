@@ -117,7 +117,9 @@ def _seconds(report: Report) -> Iterator[str]:
     if workers > 1 and not alone.any():
         yield f"Seconds: of {workers} workers side by side, so longer than alone."
     elif alone.any():
-        yield "Seconds: of holograms that were solved with nothing beside them."
+        beside = sorted({*done["label"][done["category"] != FLOOR]} - {*done["label"][alone]})
+        but = f", but for {words(beside)}" * bool(beside)
+        yield f"Seconds: of holograms that were solved with nothing beside them{but}."
 
 
 def _lpips(report: Report) -> Iterator[str]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from ...study.definition import Claim
-from ..data.board import Board
+from ..data.board import Board, is_gray
 from ..data.categories import OFFLINE, ONLINE
 from ..data.phrases import difference
 from ..data.results import Results
@@ -72,23 +72,23 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
 
 
 def _seen(here: list[Sweep]) -> Iterator[str]:
-    """The best method for an eye whose pupil is at each place, and all others whose interval is above the baseline."""
+    """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
     for sweep in (sweep for sweep in here if sweep.swept.kind == "eye_pupil"):
-        score, baseline, parts = sweep.results.headline, sweep.results.layout.baseline, list[str]()
+        results, score, parts = sweep.results, sweep.results.headline, list[str]()
+        baseline = str(results.layout.baseline)
         for place, name in sweep.swept.points:
             rivals = [label for label in sweep.methods if label != baseline]
             gains = {label: gain for label in rivals if (gain := sweep.gain(label, name)) is not None}
             ranked = sorted(gains, key=lambda label: -gains[label].mean)
-            above = [
-                f"{label} {score.with_unit(gains[label].mean, signed=True)}"
-                for label in ranked[1:]
-                if gains[label].low > 0
-            ]
-            if ranked:
-                parts.append(f"{place} {', '.join([f'{ranked[0]} {difference(score, gains[ranked[0]])}', *above])}")
+            above = [label for label in ranked if gains[label].low > 0]
+            each = [f"{label} {difference(score, gains[label])}" for label in (above or ranked)[:1]]
+            each += [f"{label} {score.with_unit(gains[label].mean, signed=True)}" for label in above[1:]]
+            gray = f" ({baseline} is no better than gray there)" * is_gray(results, baseline, name)
+            if each:
+                parts.append(f"at {place}{gray} {'' if above else 'none, at best '}{', '.join(each)}")
         if parts:
-            told = "best for an eye, and what else is above"
-            yield f"{told} {baseline}, by place of its pupil in radii of the iris: {'; '.join(parts)}"
+            told = "for an eye whose pupil is aside, in radii of the iris"
+            yield f"above {baseline} by intervals, {told}: {'; '.join(parts)}"
 
 
 def _ranges(here: list[Sweep]) -> Iterator[str]:

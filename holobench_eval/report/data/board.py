@@ -142,7 +142,6 @@ def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Dis
 def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Score, ...]) -> Iterator[Row]:
     complete = [label for label in labels if results.is_complete(label, condition)]
     complete.sort(key=lambda label: -results.headline.sign * _mean(results, label, condition))
-    floor = _floor(results, condition)
     values = np.array([results.values(label, condition) for label in complete])
     letters = dict(zip(complete, tiers(values, results.clusters), strict=True))
     for label in [*complete, *(label for label in labels if label not in complete)]:
@@ -160,7 +159,7 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
             _known(row, "memory_mib"),
             (
                 *marks(results, label, condition),
-                *(["no better than gray"] * _is_gray(results, label, condition, floor)),
+                *(["no better than gray"] * is_gray(results, label, condition)),
             ),
         )
 
@@ -171,8 +170,9 @@ def _floor(results: Results, condition: str) -> float | None:
     return _mean(results, CONSTANT, results.reference(condition)) if has_one else None
 
 
-def _is_gray(results: Results, label: str, condition: str, floor: float | None) -> bool:
-    mean = _mean(results, label, condition)
+def is_gray(results: Results, label: str, condition: str) -> bool:
+    """Whether the mean of a method is no better than that of a constant image, where one was scored."""
+    mean, floor = _mean(results, label, condition), _floor(results, condition)
     return floor is not None and math.isfinite(mean) and not results.headline.better(mean, floor)
 
 

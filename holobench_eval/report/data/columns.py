@@ -302,7 +302,8 @@ def total_captures(cells: Cells, name: str) -> float:
     if taken.empty:
         return float("nan")
     trained = taken["training_captures"].mean() if "training_captures" in taken else 0.0
-    return float(trained + taken.groupby("target", sort=False)["captures"].mean().sum())  # repeats: averaged
+    known = taken.assign(done=taken["state"] == DONE).groupby(["target", "done"], sort=False)["captures"].mean()
+    return float(trained + known.groupby("target").max().sum())  # repeats: averaged
 
 
 @column(FIGURES, "count", source=None)

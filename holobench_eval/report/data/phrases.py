@@ -114,10 +114,12 @@ def uncovered(records: Sequence[Mapping[str, Any]]) -> str:
 
 def too_few(results: Results) -> str:
     """That no test of two methods can show anything on so few clusters; empty where one can, and without any test."""
-    labels = {label for name in results.conditions for label in results.methods(name)}
+    rivals = max(
+        (len({*results.methods(name)} - {*results.layout.privileged}) for name in results.conditions), default=0
+    )
     clusters = len(set(results.clusters))
     smallest = 2.0 ** (1 - clusters)
-    if len(labels) < 2 or clusters < FEWEST or smallest < SIGNIFICANCE:
+    if rivals < 2 or clusters < FEWEST or smallest < SIGNIFICANCE:
         return ""
     return f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
 

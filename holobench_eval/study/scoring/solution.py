@@ -111,11 +111,11 @@ def _within_budget(method: Any, solve: Solve, handle: MeteredDisplay) -> tuple[A
     phase = None
     try:
         phase = solve(method, handle)
-    except BudgetError as error:
-        if handle.over and handle.kept is None:
-            raise BudgetError(f"{error} and kept no phase; bench.keep(phase) keeps the best so far") from error
+    except BudgetError:
         if not handle.over:
             raise
     if handle.over and handle.kept is not None:
         phase = handle.kept[None]
+    if handle.over and phase is None:
+        raise BudgetError(f"{handle.over} and kept no phase; bench.keep(phase) keeps the best so far")
     return phase, handle.over

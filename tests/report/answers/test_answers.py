@@ -298,7 +298,9 @@ def test_places_of_a_pupil_say_which_methods_are_above_the_baseline_at_each() ->
     for (_, name), values in zip(points, ((22.0, 21.0, 20.0), (15.0, 19.0, 17.0)), strict=True):
         means |= {f"{label}@{name}": value for label, value in zip(("old", "new", "other"), values, strict=True)}
     text = answer(results_of(means, sweeps=(Swept("eye_pupil", "bench", points),), baseline="old"))
-    assert re.search(r": 0 new -1\.00 dB \[[^]]*\]; 0\.5 new \+4\.00 dB \[[^]]*\], other \+2\.00 dB\.$", text)
+    assert text.startswith("above old by intervals, for an eye whose pupil is aside, in radii of the iris: at 0 none, ")
+    assert re.search(r"none, at best new -1\.00 dB \[[^]]*\]; at 0\.5 new \+4\.00 dB", text)
+    assert text.endswith(", other +2.00 dB.")
 
 
 def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
