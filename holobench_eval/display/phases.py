@@ -142,7 +142,7 @@ def _turns(phase: Tensor) -> dict[str, float | Tensor]:
         scales[f"{FACTOR} {math.tau / span:.3g}"] = math.tau / span
     wide = spans >= EDGE * span
     factors = torch.where(wide, math.tau / spans, 1.0)
-    if float(factors[wide].max() / factors[wide].min() - 1) >= EDGE:
+    if wide.any() and float(factors[wide].max() / factors[wide].min() - 1) >= EDGE:
         each = ", ".join(f"{value:.3g}" for value in factors.tolist())
         scales[f"{FACTOR} {each}, colour by colour, as by another two_pi_level"] = factors[:, None, None]
     return scales

@@ -113,6 +113,11 @@ def test_a_full_turn_of_each_colour_is_named_though_the_picture_is_still_there(
     assert "e+0" not in phase_doubt(read, target * torch.tensor([1.0, 1.0, 0.0])[:, None, None], display.spec)
 
 
+def test_a_phase_that_is_even_in_each_colour_is_nothing_like_a_picture(display: hb.OpenDisplay, target: Tensor) -> None:
+    even = torch.arange(3.0)[:, None, None].expand(3, *PANEL)
+    assert phase_doubt(even, target, display.spec).startswith("makes nothing like its target")
+
+
 def test_a_unit_is_named_for_values_that_do_not_fill_its_span(display: hb.OpenDisplay, target: Tensor) -> None:
     smooth = (solved(display, target, "wirtinger") % TAU).clamp(0.1 * TAU, 0.9 * TAU)
     for kind in ("turns", "levels over their number", "degrees", "levels"):
