@@ -81,7 +81,8 @@ def revision() -> dict[str, Any]:
 
 
 def _git(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, timeout=20, check=True)
+    command = ["git", "--no-optional-locks", *arguments]  # a killed run would leave its lock in the user's repository
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=20, check=True)
     return done.stdout.strip()
 
 
