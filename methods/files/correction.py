@@ -22,10 +22,9 @@ def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folde
     folder: where a relative path of the map starts. CellError, in one line: a full turn for another number of colours,
     or a map that cannot be used.
     """
-    _check_colours("two_pi_level", convention.two_pi_level, colours)
+    refuse_colours(convention, colours)
     if convention.correction is None:
         return convention
-    _check_colours("correction.two_pi_level", convention.correction.two_pi_level, colours)
     path = folder / convention.correction.file
     levels = read_array(path)
     if levels.ndim == 3 and levels.shape[-1] == colours:
@@ -52,6 +51,11 @@ def on_panel(convention: Convention, shape: tuple[int, int], colours: int, folde
     return replace(convention, turns=turns)
 
 
-def _check_colours(key: str, level: float | tuple[float, ...], colours: int) -> None:
-    if isinstance(level, tuple) and len(level) != colours:
-        raise CellError(f"{key}: {len(level)} levels for {colours} colours; expected one for all, or one for each")
+def refuse_colours(convention: Convention, colours: int) -> None:
+    """CellError for a full turn of another number of colours than a display has."""
+    levels = {"two_pi_level": convention.two_pi_level}
+    levels |= {"correction.two_pi_level": convention.correction.two_pi_level} if convention.correction else {}
+    for key, level in levels.items():
+        if isinstance(level, tuple) and len(level) != colours:
+            shown = f"{len(level)} levels for {colours} colour{'s' * (colours != 1)}"
+            raise CellError(f"{key}: {shown}; expected one for all, or one for each")

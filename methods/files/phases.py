@@ -23,7 +23,7 @@ from ...optics.phase import are_levels
 from ..common import Bench
 from ..double_phase import encode
 from .arrays import SUFFIXES, read_array
-from .correction import on_panel
+from .correction import on_panel, refuse_colours
 
 COLOURS = ("red", "green", "blue")
 
@@ -128,6 +128,13 @@ class Phases:
         paths = [path for each in patterns for number in numbers for path in self._paths(each, target_name, number)]
         return paths if self.correction is None else [*paths, self.correction.file]
 
+    def refuse_display(self, spec: DisplaySpec) -> None:
+        """UserError for full turns of another number of colours than the display has."""
+        try:
+            refuse_colours(self._convention(), len(spec.wavelengths))
+        except CellError as error:
+            raise UserError(str(error)) from None
+
     def refuse_shared(self, target_names: Iterable[str]) -> None:
         """UserError where a pattern with ``{target}`` or ``{stem}`` gives several targets the same file."""
         names, owners = list(target_names), dict[str, str]()
@@ -180,6 +187,9 @@ class Phases:
         path = pattern.replace("{target}", name).replace("{stem}", Path(name).stem).replace("{frame}", str(frame))
         return [path.replace("{channel}", name) for name in self.channels] if "{channel}" in path else [path]
 
+    def _convention(self) -> Convention:
+        return Convention(self.sign, self.origin, self.two_pi_level or 256.0, self.correction)
+
     def _read(
         self, pattern: str, target_name: str, spec: DisplaySpec, colours: int, frame: int, phases: bool = True
     ) -> Tensor:
@@ -190,8 +200,7 @@ class Phases:
             raise CellError(f"channels: {len(paths)} names for the {colours} colours of '{spec.name}'")
         if (missing := next((path for path in paths if not Path(path).is_file()), None)) is not None:
             raise CellError(f"{missing}: no such file{self._altered(pattern, target_name)}{self._hint(missing)}")
-        convention = Convention(self.sign, self.origin, self.two_pi_level or 256.0, self.correction)
-        panel = on_panel(convention, spec.shape, colours, Path()) if phases else None
+        panel = on_panel(self._convention(), spec.shape, colours, Path()) if phases else None
         if len(paths) > 1:
             planes = [self._planes(path, spec, 1, panel and panel.of(index)) for index, path in enumerate(paths)]
             return torch.cat(planes)

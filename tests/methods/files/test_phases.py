@@ -357,3 +357,11 @@ def test_the_files_of_a_target_are_those_that_are_read() -> None:
     assert [Path(path).parent.name for path in found] == ["p", "p", "a", "a", ""]
     assert all("/my_cat" in path and " " not in path for path in found[:4])
     assert found[4] == "flat.bmp"
+
+
+def test_full_turns_of_other_colours_are_refused_before_a_study_runs() -> None:
+    for params in ({"two_pi_level": [256, 250]}, {"correction": {"file": "flat.bmp", "two_pi_level": [205, 200]}}):
+        method = plugins.build("methods", "phases", params)
+        with pytest.raises(UserError, match=r"two_pi_level: 2 levels for 3 colours; expected one for all, or one for"):
+            method.refuse_display(SPEC)
+    plugins.build("methods", "phases", {"two_pi_level": [256, 250, 245]}).refuse_display(SPEC)
