@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
 
-# Read when NumPy is imported. Threads of its OpenBLAS that wait for each other took a quarter of the tests' time.
+# Read when NumPy is imported. Threads of its OpenBLAS that wait for each other took a quarter of the time of score.
 os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 import matplotlib

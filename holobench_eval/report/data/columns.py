@@ -303,7 +303,7 @@ def total_captures(cells: Cells, name: str) -> float:
         return float("nan")
     trained = taken["training_captures"].mean() if "training_captures" in taken else 0.0
     known = taken.assign(done=taken["state"] == DONE).groupby(["target", "done"], sort=False)["captures"].mean()
-    return float(trained + known.groupby("target").max().sum())  # repeats: averaged
+    return float(trained + known.groupby("target").max().sum())  # repeats: averaged, of failed ones apart
 
 
 @column(FIGURES, "count", source=None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
 import pandas as pd
@@ -11,7 +12,7 @@ import pytest
 from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.report import Description, Layout, write_report
 from holobench_eval.report.data import columns
-from holobench_eval.report.data.column import Column, Record, column, if_known, mean
+from holobench_eval.report.data.column import Cells, Column, Record, column, if_known, mean
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
 from holobench_eval.report.files.dictionary import File
@@ -39,6 +40,24 @@ def test_a_unit_is_the_last_part_of_a_column_and_the_key_comes_back() -> None:
         assert parse(expected) == parse(key)
     assert parse("psnr_linear").statistic("_lo") == "psnr_linear_lo_db"
     assert parse("ssim_linear_blur1").statistic("_hi") == "ssim_linear_blur1px_hi"
+
+
+@pytest.mark.parametrize(
+    ("cells", "photographs"),
+    [
+        ([("a", "done", 100), ("a", "done", 90), ("b", "done", 100)], 195),  # repeats of a target are averaged
+        ([("a", "done", 100), ("b", "failed", 3)], 103),
+        ([("a", "done", 100), ("a", "failed", 4)], 100),  # not their mean
+        ([("a", "failed", 4)], 4),
+        ([("a", "missing", None)], None),
+    ],
+)
+def test_photographs_of_failed_cells_count(cells: list[tuple[str, str, int | None]], photographs: float | None) -> None:
+    frame = pd.DataFrame(cells, columns=["target", "state", "captures"])
+    (total_captures,) = (each for each in columns.FIGURES if each.name == "total_captures")
+    assert total_captures.table is not None
+    total = total_captures.table(Cells(frame, Layout("a study", (), ())), "total_captures")
+    assert total == photographs or (photographs is None and math.isnan(total))
 
 
 @pytest.mark.parametrize("file", ["records.csv", "table.csv", "tests.csv"])
