@@ -144,6 +144,7 @@ def test_files_of_others_are_not_replaced(picture: Path) -> None:
         ("", "", {}, "methods"),
         ("double_phase", "", {"panel": (20, 20)}, "panel"),
         ("double_phase", "", {"display": "leto"}, "leto"),
+        ("double_phase", "", {"display": "mine.yaml"}, "profile 'mine.yaml': no such file: mine.yaml"),
         ("phases", "", {}, "none of the files that it reads is there"),
         ("double_phase", "gone.png", {}, "gone.png: no such file"),
         ("double_phase", "text.png", {}, "text.png: not an image"),
