@@ -56,7 +56,7 @@ def lines(listed: Iterable[tuple[str, str]]) -> Iterator[tuple[str, ...]]:
             continue
         other = seen.setdefault(profile.name, name)
         alike = f" ('{other}' is named '{profile.name}' too: no study has both)" if other != name else ""
-        maps = "yes" if profile.held else "no"
+        maps = profile.network.method or ("yes" if profile.held else "no")
         yield name, panel(profile), maps, whence, profile.description + alike
 
 

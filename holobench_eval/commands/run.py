@@ -75,8 +75,7 @@ def run(
 
         console, study = open_console(), load_study(config, changes)
         device, where = _where(study, device, executor, workers, address)
-        if study.display.real:
-            open_displays(study)
+        open_displays(study)
         folder, grid = options.output_folder(study, output), plan(study)
         artifacts = options.learned_folder(artifacts, grid)
         if word := replaced(study, folder):
@@ -153,12 +152,13 @@ def _where(study: Study, device: str, executor: str, workers: int | None, addres
 
 
 def open_displays(study: Study) -> None:
-    """Open and calibrate the displays of a study, so that what is wrong with a real one is reported first."""
+    """Open and calibrate the real displays and the networks of a study, so that what is wrong is reported first."""
     from ..study.displays import displays
     from ..study.opening import open_display
 
     for display in displays(study).values():
-        open_display(display, study.seed)
+        if display.real or display.network:
+            open_display(display, study.seed)
 
 
 @dataclass(frozen=True)
@@ -197,15 +197,16 @@ class Sheet:
 
 
 def sheets(study: Study, output: Path) -> list[Sheet]:
-    """The sheet of every display of a study that has stages, of many the first; learned and real ones have none."""
+    """The sheet of every display of a study that has stages, of many the first; networks and real ones have none."""
     from ..display import load_profile
     from ..report.data.statistics import FEWEST_DISPLAYS
     from ..study.displays import condition
 
     panel, folder, profiles = study.display.panel, study.folder, study.display.profiles
     return [
-        Sheet(condition(source, panel, folder), load_profile(source, folder).scaling_note(panel), study.seed, output)
+        Sheet(display, load_profile(source, folder).scaling_note(panel), study.seed, output)
         for source in (profiles[:1] if len(profiles) >= FEWEST_DISPLAYS else profiles)
+        if not (display := condition(source, panel, folder)).network
     ]
 
 

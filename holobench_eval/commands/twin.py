@@ -29,6 +29,10 @@ def twin(
     pictures: Annotated[
         int | None, typer.Option(min=3, max=11, help="So many pictures try the twin. [default: 8]")
     ] = None,
+    network: Annotated[
+        str | None,
+        typer.Option(help="This method learns the display, in the place of a twin: for one outside the twin's form."),
+    ] = None,
     artifacts: Learned = ARTIFACTS,
     retrain: Annotated[bool, RETRAIN] = False,
 ) -> None:
@@ -46,13 +50,13 @@ def twin(
     name = output.resolve().name
     if file_name(name) != name:
         raise UserError(f"{output}: the folder names the display; expected {NAME}")
-    source = _photographs(display, output, panel, pictures, artifacts, retrain)
+    source = _photographs(display, output, panel, pictures, network, artifacts, retrain)
     print(f"{output}: photographs are there; the twin is tried on the same holograms")
     profile = twins.write_trial(source, name, output)
     _run(output, TRIAL, artifacts, retrain=False)
     trial = twins.in_folder(output, artifacts, TRIAL)
     found = tried(source, trial, name)
-    path = twins.publish(replace(profile, twin=found.trust()), output)
+    path = twins.publish(replace(profile, twin=found.trust()), source, output)
     report = write_twin(output, source, trial, found, path)
     for sentence in answer(found):
         print(f"- {sentence}")
@@ -60,7 +64,13 @@ def twin(
 
 
 def _photographs(
-    display: str, output: Path, panel: tuple[int, int] | None, pictures: int | None, artifacts: Path, retrain: bool
+    display: str,
+    output: Path,
+    panel: tuple[int, int] | None,
+    pictures: int | None,
+    network: str | None,
+    artifacts: Path,
+    retrain: bool,
 ) -> Photographed:
     """The photographs of a session, or those that are taken now."""
     from ..core.io import write_atomically
@@ -74,8 +84,9 @@ def _photographs(
             own = Path(display, f"{Path(display).resolve().name}.yaml")
             hint = f"; the twin there is {own}" * own.is_file()
             raise UserError(f"{display}: a folder without {MANIFEST}; give that of a session, or a display{hint}")
-        if (panel, pictures, retrain) != (None, None, False):
-            raise UserError(f"{display}: --panel, --pictures and --retrain are not for a session, which has its study")
+        if (panel, pictures, network, retrain) != (None, None, None, False):
+            options = "--panel, --pictures, --network and --retrain"
+            raise UserError(f"{display}: {options} are not for a session, which has its study")
         source = twins.of_session(Path(display))
         twins.refuse(name, source, output)
         return source
@@ -84,7 +95,7 @@ def _photographs(
     if panel and twins.is_bench(Path(display)):
         raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
     twins.refuse_fourier(display)
-    text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES)
+    text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES, network)
     config = output / WORK / f"{PHOTOGRAPHS}.yaml"
     is_new = not config.exists()
     if not is_new and config.read_text(encoding="utf-8") != text:

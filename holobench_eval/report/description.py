@@ -125,6 +125,8 @@ def simulated(
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
     measured = "simulated, with parameters that are assumed or from data sheets and measured on no panel"
+    if profile.network.method:
+        return ", ".join(filter(None, (f"predicted by a trained {profile.network.method}", profile.twin.words)))
     if profile.twin.of:
         return f"simulated, {profile.twin.words}"
     if profile.held:

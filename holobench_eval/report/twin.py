@@ -27,7 +27,7 @@ PICTURES, SCORES = "pictures.jpg", "scores.png"
 def write_twin(folder: Path, photographed: Photographed, trial: Photographed, found: Trial, profile: Path) -> Path:
     """Write ``report.md`` and its pictures; returns the path of the former."""
     _draw(folder, photographed, trial, found)
-    path = folder / "report.md"
+    path, less = folder / "report.md", len(found.twins) > 1
     text = blocks(
         [
             heading(f"{found.name}: the twin of {found.of}", 1),
@@ -40,13 +40,10 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             "95 % intervals. Against a photograph: of a capture of the twin. Further: how much higher that of a second "
             "photograph is, which differs by noise alone; of all colours, and of each.",
             Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
-            "Pale: the twin with its maps turned by half a turn (x), and without maps (+).",
+            *(["Pale: the twin with its maps turned by half a turn (x), and without maps (+)."] if less else []),
             heading("Differences of two methods"),
             _pairs(found),
-            heading("Beside twins that know less"),
-            _others(found),
-            f"Only what the first row has and the others lack is knowledge of {found.of}: a column in which the second "
-            "is as good tells nothing.",
+            *(_others(found) if less else []),
             heading("What it says of the display"),
             *_parameters(photographed),
             heading("How to use it"),
@@ -108,7 +105,8 @@ def _pairs(found: Trial) -> Markdown:
     return table(["methods", "display [dB]", "twin [dB]", "apart [dB]"], lines)
 
 
-def _others(found: Trial) -> Markdown:
+def _others(found: Trial) -> Iterable[Markdown | str]:
+    yield heading("Beside twins that know less")
     head = ["display", "further, mean [dB]", "Kendall's tau", "two without a camera, off by [dB]"]
     lines = [
         [
@@ -119,7 +117,11 @@ def _others(found: Trial) -> Markdown:
         ]
         for name, shown in found.twins.items()
     ]
-    return table(head, lines)
+    yield table(head, lines)
+    yield (
+        f"Only what the first row has and the others lack is knowledge of {found.of}: a column in which the second is "
+        "as good tells nothing."
+    )
 
 
 def _parameters(photographed: Photographed) -> Iterable[Markdown | str]:

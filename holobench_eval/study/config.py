@@ -198,6 +198,8 @@ def _specs(study: Study, document: Document) -> dict[str, DisplaySpec]:
                 raise UserError(f"{both}; list each display once")
             if learned:
                 refuse_plane(isolation.traits(learned.method, study.folder), learned.method, display.spec)
+        if study.measure in STACKS and display.network:
+            raise document.error(("measure",), f"measure: {study.measure} moves planes; '{profile}' is a network")
         if study.measure in STACKS and display.spec.plane == "fourier":
             message = f"measure: {study.measure} needs a Fresnel plane; '{profile}' has a Fourier plane"
             raise document.error(("measure",), message)
@@ -242,6 +244,8 @@ def _entry(study: Study, document: Document, entry: MethodEntry, specs: Mapping[
     with placed(document, (*where, "name"), (*where, "name")):
         for source in profiles:
             refuse_plane(traits, entry.name, specs[source])
+            if traits.privileged and study.display.profiles and load_profile(source, study.folder).network.method:
+                raise UserError(f"'{entry.name}' looks into a simulated bench, and '{source}' is a network")
             if hasattr(method, "refuse_display"):
                 method.refuse_display(specs[source])
     return replace(entry, params=isolation.params_of(method), profiles=profiles)

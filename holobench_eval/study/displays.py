@@ -44,7 +44,7 @@ class Condition:
     version, digest: those of the profile; spec: its nominal optics at the study's panel size; learned: what has to be
     prepared for a display that is a trained network (the other fields are those of the display it was trained on,
     except for its name); change: kind and value of what has changed on it since methods were prepared (None: nothing);
-    real: where its photographs come from (None: it is simulated).
+    real: where its photographs come from (None: it is simulated); network: whether the profile is a trained network.
     """
 
     source: str
@@ -56,6 +56,7 @@ class Condition:
     learned: Preparation | None = None
     change: tuple[str, Value] | None = None
     real: RealSource | None = None
+    network: bool = False
 
     @property
     def in_session(self) -> bool:
@@ -179,7 +180,8 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
     profile = load_profile(source, folder=folder)
     spec = profile.spec(panel)
     refuse_far(spec, profile.panel.distance)
-    return Condition(source, folder, profile.name, profile.version, profile.digest, spec)
+    network = profile.network.method is not None
+    return Condition(source, folder, profile.name, profile.version, profile.digest, spec, network=network)
 
 
 def real_condition(source: str, folder: Path) -> Condition:

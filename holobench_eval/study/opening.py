@@ -9,20 +9,25 @@ import torch
 from ..core.device import CPU
 from ..core.errors import CellError, UserError
 from ..display import CalibratedBench, Profile, load_profile
+from ..display.learned import LearnedBench
 from ..display.simulated.changes import KINDS, altered
 from ..display.simulated.pipeline import SimulatedBench
+from ..display.simulated.profile import profile_files
 from ..lab.bench_file import load_bench_file
 from ..lab.live import open_live
 from ..lab.real import RealBench
 from ..lab.session import session_photographer
 from ..methods.fiducials import fiducial_phases
 from .displays import Condition, RealSource
+from .network_display import network_bench
+
+Bench = CalibratedBench | RealBench | LearnedBench
 
 # Limits on the benches that a process keeps open, their pixels in all and their number; two are always kept.
 OPEN_PIXELS, OPEN_BENCHES = 8 * 1080 * 1920, 64
 
 
-def open_display(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench | RealBench:
+def open_display(display: Condition, seed: int, device: torch.device = CPU) -> Bench:
     """The bench of a display, built and calibrated once in a process; a simulated bench is computed on ``device``.
 
     CellError when its calibration cannot be trusted; a failed calibration is kept and not repeated for every cell.
@@ -37,7 +42,7 @@ def simulated(display: Condition, seed: int, device: torch.device = CPU) -> Cali
     return bench
 
 
-def _cached(display: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench:
+def _cached(display: Condition, seed: int, device: torch.device) -> Bench:
     where = None if display.real else device  # a real one is opened once, whoever computes
     key = (
         display.source,
@@ -61,7 +66,7 @@ def _cached(display: Condition, seed: int, device: torch.device) -> CalibratedBe
     return opened
 
 
-_open: OrderedDict[object, CalibratedBench | RealBench | CellError] = OrderedDict()  # least recently used first
+_open: OrderedDict[object, Bench | CellError] = OrderedDict()  # least recently used first
 
 
 def forget_sessions() -> None:
@@ -86,12 +91,14 @@ def open_bench(
     return CalibratedBench(bench, seed, fiducial_phases, registered_as)
 
 
-def _opened(display: Condition, seed: int, device: torch.device) -> CalibratedBench | RealBench | CellError:
+def _opened(display: Condition, seed: int, device: torch.device) -> Bench | CellError:
     if display.real is not None:
         return _open_real(display, display.real, seed)
     profile = load_profile(display.source, folder=display.folder)
     if profile.digest != display.digest:
         raise UserError(f"profile '{display.source}' has changed since the study was planned; start the run again")
+    if display.network:
+        return network_bench(profile, profile_files(display.source, display.folder)[0].parent, seed, device)
     unmoved = None
     try:
         if display.change is not None:

@@ -24,7 +24,6 @@ from ..display.estimates import joined
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..display.traits import traits_of
-from ..lab.real import RealBench
 from . import isolation, opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
@@ -123,19 +122,19 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     artifacts.write(preparation, state, facts | diagnosis(method, state, display_bench))
 
 
-def diagnosis(method: Any, state: Mapping[str, Any], display_bench: CalibratedBench | RealBench) -> dict[str, Any]:
+def diagnosis(method: Any, state: Mapping[str, Any], display_bench: opening.Bench) -> dict[str, Any]:
     """A method's estimates of the display, beside the ground truth; empty without ``estimates`` or ``form``.
 
     estimates: see ``display.estimates.joined``; missing: texts of the bench's effects that the model's ``form`` has no
-    term for; diagnosis_failed: the error, if there was one. A real bench has no ground truth.
+    term for; diagnosis_failed: the error, if there was one. A real bench and a network have no ground truth.
     """
     traits = traits_of(method)
     findings: dict[str, Any] = {}
     try:
         if "estimates" in traits.functions:
-            true_values = () if isinstance(display_bench, RealBench) else truth(display_bench.bench)
+            true_values = truth(display_bench.bench) if isinstance(display_bench, CalibratedBench) else ()
             findings["estimates"] = joined(method.estimates(state, display_bench.spec), true_values)
-        if traits.form is not None and not isinstance(display_bench, RealBench):
+        if traits.form is not None and isinstance(display_bench, CalibratedBench):
             findings["missing"] = [
                 effect.text for effect in display_bench.bench.profile.effects() if effect.name not in traits.form
             ]

@@ -27,8 +27,8 @@ LENGTHS = (2.0, 4.0, 8.0, 16.0)
 GRAY = 0.25
 
 
-def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
-    """``count`` patterns, captured, one capture each."""
+def pattern_samples(bench: TrainingBench, count: int, again: int = 0) -> list[Sample]:
+    """``count`` patterns, captured, one capture each. again: of the same patterns before, whose noise is another."""
     spec, numbers = bench.spec, range(count)
     gray = torch.full((len(spec.wavelengths), *spec.region.shape), GRAY, device=bench.device)
     images = [TrainingImage(f"pattern-{number:02d}", gray) for number in numbers]
@@ -38,7 +38,8 @@ def pattern_samples(bench: TrainingBench, count: int) -> list[Sample]:
         random_phase(len(spec.wavelengths), spec.shape, length, draw).to(bench.device)
         for length, draw in zip(lengths, draws, strict=True)
     ]
-    return list(captured(bench, [f"pattern {number}" for number in numbers], phases, images, "pattern"))
+    names, told = (("pattern", again), f" again {again}") if again else (("pattern",), "")
+    return list(captured(bench, [f"pattern {number}{told}" for number in numbers], phases, images, *names))
 
 
 def dark_samples(bench: TrainingBench) -> list[Sample]:

@@ -71,4 +71,6 @@ def train(
         if not checkpoint.passed:  # not in the paper: images that D does not learn from show how far it can be trusted
             Phi = checkpoint.phases("held out", k + 1, bench.held_out, partial(optimise, k + 1))
             unseen = checkpoint.captures("held out", k + 1, bench.held_out, Phi)
-            checkpoint.log(schedule.steps_of(k), fidelity(D, unseen))
+            checkpoint.watch(fidelity(D, unseen))
+        if schedule.ends(checkpoint.watched):
+            break

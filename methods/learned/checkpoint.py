@@ -95,6 +95,17 @@ class Checkpoint:
         done = sum(steps[: self._round - 1]) + step
         self._bench.log(round=self._round, step=step, share=round(done / sum(steps), 4), **values)
 
+    def watch(self, values: Mapping[str, float]) -> None:
+        """Log and keep how far the present round can be trusted, see ``fidelity``."""
+        self.log(self._schedule.steps_of(self._round), values)
+        self._bench.save(f"fidelity {self._round}", dict(values))
+
+    @property
+    def watched(self) -> list[float]:
+        """How well each round up to the present one predicted captures of held-out images [dB]."""
+        kept = (self._bench.load(f"fidelity {number}") for number in range(1, self._round + 1))
+        return [values["fidelity_psnr"] for values in kept if values]
+
     def _is_new(self, purpose: str) -> bool:
         """Whether what is retrieved and captured is of a round that was not learned from before the interruption."""
         return purpose == "round" and self._round > int(self._saved["round"])

@@ -64,6 +64,10 @@ class Schedule:
         """The steps of a round."""
         return self.steps if number == 1 else self.refine_steps
 
+    def ends(self, watched: Sequence[float]) -> bool:
+        """Whether the rounds so far are enough, by how well each predicted captures of held-out images [dB]."""
+        return False
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -77,12 +81,15 @@ class Sample:
         ``(C, h, w)``, linear light.
     light : Tensor
         ``(C,)``, that of a white pixel which all of the panel's light went into, the unit of the capture.
+    number : int
+        Of the capture, in the order in which all captures of a training were taken.
     """
 
     phase: Tensor
     capture: Tensor
     target: Tensor
     light: Tensor
+    number: int = 0
 
 
 class Approximator(Protocol):
@@ -124,7 +131,7 @@ def captured(
     bench.announce((phase, image, names) for phase, image in zip(phases, images, strict=True))
     for key, phase, image in zip(keys, phases, images, strict=True):
         kept = bench.kept(key, partial(_photograph, bench, phase, image, *names))
-        yield Sample(phase, kept["capture"], image.target, bench.light(image))
+        yield Sample(phase, kept["capture"], image.target, bench.light(image), kept["number"])
 
 
 def together(*kinds: Callable[[], Sequence[Sample]]) -> list[Sample]:
@@ -141,5 +148,5 @@ def together(*kinds: Callable[[], Sequence[Sample]]) -> list[Sample]:
     return found
 
 
-def _photograph(bench: TrainingBench, phase: Tensor, image: TrainingImage, *names: object) -> dict[str, Tensor]:
-    return {"capture": bench.photograph(phase, image, *names)}
+def _photograph(bench: TrainingBench, phase: Tensor, image: TrainingImage, *names: object) -> dict[str, Any]:
+    return {"capture": bench.photograph(phase, image, *names), "number": bench.captures}

@@ -24,6 +24,7 @@ from ..calibrated.approximator import PredictedCapture
 from ..calibrated.diagnosis import diagnose, haze
 from ..calibrated.display_model import KNOTS
 from ..learned.samples import Sample
+from .drift import taken
 from .model import TwinCamera, TwinModel
 
 QUANTILE = 2.35  # of Student's t, 90 % of which lie within: a spread over three colours
@@ -80,20 +81,24 @@ def unseen(model: TwinModel, camera: TwinCamera, samples: Sequence[Sample]) -> l
     is_blocked = math.hypot(*spec.blaze) > (spec.pupil or math.inf) / 2
     found = [name for name in NUDGES if is_blocked and name.startswith("undiffracted")]
     looked_at = samples[:: max(1, len(samples) // LOOKED_AT)]
-    shown = PredictedCapture(model, None, camera)
-    before = [shown(sample.phase, sample.light) for sample in looked_at]
+    before = [_shown(model, camera, sample) for sample in looked_at]
     left = sum(float((image - sample.capture).square().mean()) for image, sample in zip(before, looked_at, strict=True))
     for name, nudge in NUDGES.items():
         pair = copy.deepcopy(model), copy.deepcopy(camera)
         nudge(*pair, QUANTITIES[name].error)
-        nudged = PredictedCapture(pair[0], None, pair[1])
         changed = sum(
-            float((nudged(sample.phase, sample.light) - image).square().mean())
+            float((_shown(*pair, sample) - image).square().mean())
             for image, sample in zip(before, looked_at, strict=True)
         )
         if changed < FAINTEST**2 * left:
             found.append(name)
     return list(dict.fromkeys(found))
+
+
+def _shown(model: TwinModel, camera: TwinCamera, sample: Sample) -> Tensor:
+    with taken(camera, sample):
+        shown: Tensor = PredictedCapture(model, None, camera)(sample.phase, sample.light)
+        return shown
 
 
 Nudge = Callable[[TwinModel, TwinCamera, float], None]  # changes a twin by an amount of a quantity, in all colours

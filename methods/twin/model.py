@@ -19,13 +19,15 @@ from ...display.api import DisplaySpec
 from ...display.estimates import MODES as ALL_MODES
 from ...display.simulated.stages.panel import straight_through_level
 from ...display.simulated.stages.propagation import sample_weights
+from ...imaging.shifts import correlate
 from ...optics.phase import TAU
-from ...optics.phasor import phasor, squared_modulus
+from ...optics.phasor import phasor
 from ..calibrated.display_model import SAMPLES, DisplayModel, Maps, enlarged, pupil_modes, sub_samples
-from ..calibrated.terms import ImageTerms, spread
+from ..calibrated.terms import ImageTerms
 
 FINER = 2  # samples of the image, a pixel and axis, at which its intensity is not undersampled
-WINDOW = 5.0  # px, standard deviation of the window of the interpolation
+WINDOW, BETWEEN = 5.0, 15  # px, standard deviation of the window of the interpolation, and where it ends
+WIDEST = 12  # samples of the image, to each side, that the camera's blur reaches: six pixels of the panel
 FINE = 0.1  # of a step of the smooth maps, that of a pixel
 POSE_GRID = 4  # points along an axis of the camera's displacement
 
@@ -60,7 +62,7 @@ class TwinModel(DisplayModel):
     def over_panel(self, phase: Tensor) -> Tensor:
         """See the class."""
         maps = self._maps()
-        return squared_modulus(finer(self._image(self._shown(phase, maps), maps, (0.0,) * len(phase))))
+        return finer(self._image(self._shown(phase, maps), maps, (0.0,) * len(phase)))
 
     forward = over_panel
 
@@ -98,43 +100,69 @@ class TwinModel(DisplayModel):
 class TwinCamera(ImageTerms):
     """``ImageTerms`` of an image of two samples a pixel and axis, seen where the registration has left it.
 
-    moved: displacement of the picture [px], rows and columns, ``(2, n, n)``, for all colours.
+    moved: displacement of the picture [px], rows and columns, ``(2, n, n)``, for all colours. drift: of the picture
+    [px in 100 captures]. power: relative, rms, by which that of the light varies from capture to capture; of neither a
+    display that was registered just now has any. captures: taken since then.
     """
 
     places: Tensor
+    power: Tensor
+    captures = 0
 
     def __init__(self, spec: DisplaySpec) -> None:
         super().__init__(spec)
         self.moved = nn.Parameter(torch.zeros(2, POSE_GRID, POSE_GRID))
+        self.drift = nn.Parameter(torch.zeros(2))
+        self.register_buffer("power", torch.zeros(()))
         places = torch.meshgrid(*(torch.arange(side, dtype=torch.float32) for side in spec.shape), indexing="ij")
         self.register_buffer("places", torch.stack(places), persistent=False)
 
     def forward(self, intensity: Tensor) -> Tensor:
         """Intensity ``(C, 2 H, 2 W)``, 1 at a white pixel, to the capture ``(C, h, w)`` of the region."""
-        widths = self.blur.exp() * FINER
-        rows, columns = (spread(side, widths[:, axis], True) for axis, side in enumerate(intensity.shape[-2:]))
-        return self._counted(self._hazy(self._seen(rows @ intensity @ columns.mT), intensity[:, ::FINER, ::FINER]))
+        seen = self._seen(blurred(intensity, self.blur.exp() * FINER))
+        return self._counted(self._hazy(seen, intensity[:, ::FINER, ::FINER]))
 
     def _seen(self, image: Tensor) -> Tensor:
         """An image ``(C, 2 H, 2 W)`` at the displaced pixels, ``(C, H, W)``."""
         _, height, width = self.places.shape
-        at = (self.places + enlarged(self.moved, (height, width))) * FINER
+        moved = enlarged(self.moved, (height, width)) + self.drift[:, None, None] * (self.captures / 100)
+        at = (self.places + moved) * FINER
         ends = at.new_tensor([side - 1 for side in image.shape[-2:]])[:, None, None]
         grid = (2 * at / ends - 1).flip(0).permute(1, 2, 0).expand(len(image), -1, -1, -1)
         return functional.grid_sample(image[:, None], grid, "bilinear", "border", align_corners=True)[:, 0]
 
 
 def finer(field: Tensor) -> Tensor:
-    """A field ``(C, H, W)`` at ``FINER`` samples a pixel and axis, ``(C, 2 H, 2 W)``; dark beyond its edges."""
-    rows, columns = (_interpolation(side).to(field) for side in field.shape[-2:])
-    return rows @ field @ columns.mT
+    """Intensity of a field ``(C, H, W)`` at ``FINER`` samples a pixel and axis, ``(C, 2 H, 2 W)``; dark beyond its
+    edges."""
+    parts = torch.stack([field.real, field.imag])
+    for dim in (-2, -1):
+        ends = (0, 0) * (-1 - dim) + (BETWEEN - 1, BETWEEN)
+        halfway = correlate(functional.pad(parts, ends), _interpolation(), dim)
+        parts = torch.stack([parts, halfway], dim % parts.ndim + 1).flatten(dim - 1, dim)
+    return parts.square().sum(0)
 
 
 @cache
-def _interpolation(side: int) -> Tensor:
-    """Values at ``FINER`` places a pixel from those of a line of pixels, ``(2 side, side)``: a sinc behind a Gaussian
-    window, local, so that what the edges of a picture cut off does not ripple through it."""
-    with torch.inference_mode(False):
-        away = torch.arange(FINER * side, dtype=torch.float64)[:, None] / FINER - torch.arange(side)
-        window = torch.exp(-((away / WINDOW) ** 2) / 2) * (away.abs() < 3 * WINDOW)
-        return torch.sinc(away) * window
+def _interpolation() -> list[float]:
+    """Weights of the pixels around a place halfway between two: a sinc behind a Gaussian window, local, so that what
+    the edges of a picture cut off does not ripple through it."""
+    away = torch.arange(1 - BETWEEN, BETWEEN + 1, dtype=torch.float64) - 1 / FINER
+    weights: list[float] = (torch.sinc(away) * torch.exp(-((away / WINDOW) ** 2) / 2)).tolist()
+    return weights
+
+
+def blurred(image: Tensor, widths: Tensor) -> Tensor:
+    """Images ``(C, H, W)``, each pixel a mean of those around it, so that flat light stays flat up to the edges.
+
+    widths: standard deviations [px] of the Gaussian weights down and across, ``(C, 2)``; they end at ``WIDEST``.
+    """
+    away = torch.arange(-WIDEST, WIDEST + 1, device=image.device)
+    for axis, width in enumerate(widths.T):
+        taps = torch.exp(-((away / width[:, None]) ** 2) / 2)
+        kernel = taps.view(len(taps), 1, *((-1, 1) if axis == 0 else (1, -1)))
+        ends = (0, 0, WIDEST, WIDEST) if axis == 0 else (WIDEST, WIDEST, 0, 0)
+        line = torch.ones_like(image[:, :, :1] if axis == 0 else image[:, :1])
+        sums = (functional.conv2d(functional.pad(each, ends), kernel, groups=len(taps)) for each in (image, line))
+        image = next(sums) / next(sums)
+    return image

@@ -26,12 +26,12 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> 
     """A folder where twins learn next to nothing, at once."""
     whole = twins.study_text
 
-    def text(display: str, panel: tuple[int, int], pictures: int) -> str:
+    def text(display: str, panel: tuple[int, int], pictures: int, network: str | None = None) -> str:
         config = yaml.safe_load(whole(display, panel, pictures))
         config["methods"] = [
             "double_phase",
             {"name": "wirtinger", "params": {"iterations": 3}},
-            {"name": "twin", "params": QUICK["twin"]},
+            {"name": network or "twin", "params": QUICK[network or "twin"]},
         ]
         config["training"]["params"]["count"] = 4
         config["protocol"]["metrics"] = ["psnr"]
@@ -65,7 +65,8 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert basis(profile).startswith(f"simulated, a twin of green, trained with {photographs} photographs: its captur")
     Path("lab/lab.npz").unlink()
     source = twins.in_folder(Path("lab"), Path("artifacts"))
-    assert load_profile(str(twins.publish(twins.write_trial(source, "lab", Path("lab")), Path("lab")))).version == 2
+    again = twins.write_trial(source, "lab", Path("lab"))
+    assert load_profile(str(twins.publish(again, source, Path("lab")))).version == 2
     with pytest.raises(UserError, match=r"^lab: holds the twin of another display or of other settings"):
         twin("ideal", Path("lab"), panel=PANEL, pictures=3)
 
@@ -126,3 +127,12 @@ def test_the_file_of_a_bench_is_told_from_a_profile(text: str, is_bench: bool, t
     path.write_text(text)
     assert twins.is_bench(path) == is_bench
     assert ("bench" in yaml.safe_load(twins.study_text(str(path), (128, 128), 3))["display"]) == is_bench
+
+
+@pytest.mark.slow
+def test_a_trained_method_becomes_a_display_that_a_study_runs_on(quick: Path) -> None:
+    twin(str(write_green(quick, "leto-aged")), Path("net"), panel=PANEL, pictures=3, network="parametric_model")
+    profile = load_profile("net/net.yaml")
+    assert (profile.network.method, profile.twin.of, profile.twin.pictures) == ("parametric_model", "green", 3)
+    assert "net-turned" not in Path("net/report.md").read_text()
+    assert basis(profile).startswith("predicted by a trained parametric_model, a twin of green, trained with")

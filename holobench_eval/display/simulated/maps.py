@@ -122,7 +122,7 @@ def load_maps(given: MapFile, folder: Path, sizes: Mapping[str, int]) -> dict[st
     """
     if given.file is None:
         return {}
-    path = _inside(given.file, folder)
+    path = inside(given.file, folder)
     state = file_state(path)
     if state is None:
         raise UserError(f"no such file: {path}")
@@ -141,8 +141,8 @@ def load_maps(given: MapFile, folder: Path, sizes: Mapping[str, int]) -> dict[st
     return loaded
 
 
-def _inside(name: str, folder: Path) -> Path:
-    """Where the file is. UserError: not within the folder, or only by a link."""
+def inside(name: str, folder: Path) -> Path:
+    """Where a file of a profile's folder is. UserError: not within the folder, or only by a link."""
     if PurePath(name).is_absolute() or ".." in PurePath(name).parts:
         raise UserError(f"{name!r} is not a file in the profile's folder; give its name, or a path below that folder")
     path = folder / name

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from ...core.device import CPU
+from ...core.errors import UserError
 from ...core.seeds import generator
 from ...optics.blocks import in_blocks
 from ...optics.convolution import frequencies
@@ -69,6 +70,8 @@ class SimulatedBench:
     """
 
     def __init__(self, profile: Profile, device: torch.device = CPU) -> None:
+        if profile.network.method:
+            raise UserError(f"'{profile.name}' is a network: it has no stages to build a bench of or to draw")
         self.profile = profile
         self.device = device
         self.spec: DisplaySpec = profile.spec()

@@ -18,6 +18,7 @@ from ...core.yaml_source import Document, load
 from ..api import DisplaySpec
 from . import stages as kinds
 from .maps import KEYS, MapFile, load_maps
+from .network import NetworkFile
 from .shelf import installed, shelves
 from .stage import Effect, Stage
 from .trust import Trust
@@ -53,6 +54,8 @@ class Profile:
         Largest registration residual with which a study may run [region px, rms].
     maps
         A file of measured maps, which act in the place of what stages draw.
+    network
+        A trained method that predicts captures, in the place of the stages; without noise.
     twin
         Of a profile that was learned from photographs of a display: how far it can stand for that.
     like
@@ -93,6 +96,7 @@ class Profile:
     drift: kinds.Drift = kinds.Drift()
     residual_bound: Annotated[float, Interval(gt=0, le=2)] = 0.3
     maps: MapFile = MapFile()
+    network: NetworkFile = NetworkFile()
     twin: Trust = Trust()
     like: str | None = None
     digest: str = field(default="", metadata={"key": False})
@@ -104,6 +108,8 @@ class Profile:
 
     def effects(self) -> list[Effect]:
         """Every effect, in the order in which light meets them; those that are switched off are left out."""
+        if self.network.method:
+            return [Effect("network", f"all that a trained {self.network.method} predicts")]
         return [effect for stage in self.stages for effect in stage.effects(self)]
 
     @property
@@ -121,6 +127,14 @@ class Profile:
                     yield (stage, other), f"{stage}.{other} has no effect beside the map {key}"
             if key == "lut.table" and own.maps[name].shape[1] != 2**self.panel.bits:
                 yield ("panel", "bits"), f"the map {key} has {own.maps[name].shape[1]} levels, not {2**self.panel.bits}"
+
+    def network_faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Stages and maps beside a network, which has no place for them."""
+        if self.network.method:
+            neutral = Profile(self.name, self.version, self.seed, self.description, self.panel)
+            for name in (*STAGES.keys() - {"panel"}, "maps", "sampling"):
+                if getattr(self, name) != getattr(neutral, name):
+                    yield (name,), f"'{name}' has no effect beside a network"
 
     def plane_faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """Keys that have no meaning in a Fourier plane, and why."""
@@ -164,9 +178,11 @@ class Profile:
         rows, columns = (min(given, side) for given, side in zip(shape, own, strict=True))
         if (rows, columns) == own:
             return self
-        if self.held:
-            size = f"{own[0]} x {own[1]}"
-            raise UserError(f"'{self.name}' has maps of its panel of {size} pixels; give that panel, not {list(shape)}")
+        if self.held or self.network.method:
+            what, size = "maps" if self.held else "a network", f"{own[0]} x {own[1]}"
+            raise UserError(
+                f"'{self.name}' has {what} of its panel of {size} pixels; give that panel, not {list(shape)}"
+            )
         distance = self.panel.distance * rows / self.panel.shape[0]
         return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
 
@@ -238,7 +254,7 @@ def _built(document: Document, values: Mapping[str, Any]) -> Profile:
     profile = typed(document, Profile, values)
     for key, fault in profile.panel.faults():
         raise document.error(("panel", key), fault)
-    for where, fault in profile.plane_faults():
+    for where, fault in (*profile.plane_faults(), *profile.network_faults()):
         raise document.error(where, fault)
     if fault := profile.panel.fault_of(profile.lut.table):
         raise document.error(("lut", "table"), fault)

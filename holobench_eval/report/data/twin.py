@@ -114,7 +114,7 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
     labels = tuple(dict.fromkeys(label for label, _ in photographed.own))
     targets = {item: photographed.target(item) for item in pictures}
     display: dict[str, NDArray[np.float64]] = {}
-    twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name)}
+    twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name, photographed)}
     on_twins = trial.cells()
     noise = {
         item: Noise.of([photographed.pair(*key) for key in photographed.twice if key[1] == item]) for item in pictures

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,11 @@ from ...methods.twin.to_profile import to_profile, write_profile
 from ...metrics import match
 from ..artifacts import Artifact, Artifacts
 from ..config import load_study
-from ..definition import Study
+from ..definition import MethodEntry, Study
 from ..displays import Condition, displays
 from ..folders.session import ARTIFACTS, REPORT, study_of
+from ..isolation import traits
+from ..network_display import write_network
 from ..opening import open_bench
 from ..plan import Cell, Plan, plan
 from ..scoring.scores import kept_capture
@@ -47,14 +49,18 @@ OF_PROFILES = {"seed", "like", "sampling", "maps"}
 FEWEST = 3  # pictures, and methods: two without a camera, whose difference is compared, and the twin
 
 
-def study_text(display: str, panel: tuple[int, int], pictures: int) -> str:
-    """The config of the photographs of a display: a profile, by name or file, or the file of a bench."""
+def study_text(display: str, panel: tuple[int, int], pictures: int, network: str | None = None) -> str:
+    """The config of the photographs of a display: a profile, by name or file, or the file of a bench.
+
+    network: a method that learns the display in the place of the twin's equations.
+    """
     config = yaml.safe_load(shipped_configs()["twin"].read_bytes())
     path = Path(display)
     shown = str(path.resolve()) if path.is_file() else display
     config["title"] = f"Photographs for a twin of {path.stem if path.is_file() else display}"
     config["display"] = {"bench": shown} if is_bench(path) else {"profiles": [shown], "panel": list(panel)}
     config["targets"]["params"]["count"] = pictures
+    config["methods"] = [network if network and each == "twin" else each for each in config["methods"]]
     return yaml.safe_dump(config, sort_keys=False)
 
 
@@ -103,12 +109,22 @@ class Photographed:
         return own[0]
 
     @cached_property
+    def row(self) -> MethodEntry:
+        """The method that has learned the display: the twin, or where there is none the one that predicts captures.
+        UserError: there are none or several."""
+        rows = [entry for entry in self.study.methods if entry.name == "twin"] or [
+            entry
+            for entry in self.study.methods
+            if (own := traits(entry.name, self.study.folder)).trains and "predict" in own.functions
+        ]
+        if len(rows) != 1:
+            raise UserError(f"{self.study.file}: {len(rows)} methods learn the display; expected one, such as twin")
+        return rows[0]
+
+    @property
     def label(self) -> str:
-        """Of the row that has learned the twin. UserError: there are none or several."""
-        labels = [entry.label for entry in self.study.methods if entry.name == "twin"]
-        if len(labels) != 1:
-            raise UserError(f"{self.study.file}: {len(labels)} methods are called twin; expected one")
-        return labels[0]
+        """Of ``row``."""
+        return self.row.label
 
     def cells(self) -> dict[str, dict[tuple[str, str], list[Cell]]]:
         """The cells of methods by display, and by label and target, in the order of repeats."""
@@ -233,17 +249,21 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     for kind, found in zip(("methods", "pictures"), map(set, zip(*photographed.own, strict=True)), strict=True):
         if len(found) < FEWEST:
             raise UserError(f"{photographed.study.file}: {len(found)} {kind}; a twin is tried on {FEWEST} or more")
-    trial = folder / WORK / TRIAL
+    trial, row = folder / WORK / TRIAL, photographed.row
     base = nominal(name, photographed)
+    config, names = folder / WORK / f"{TRIAL}.yaml", trial_names(name, photographed)
+    write_atomically(config, _trial_text(photographed, names).encode())
+    if row.name != "twin":
+        state = photographed.learned.state
+        return load_profile(str(write_network(state, row.name, row.params, base, trial)))
     model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
     untried = load_profile(str(to_profile(model, camera, base, trial)))
     base = replace(base, sensor=_camera(photographed, untried))
     profile = load_profile(str(to_profile(model, camera, base, trial)))
     held = load_maps(profile.maps, trial, _sizes(profile))
     turned = {key: values.flip(-2, -1) if key in OVER_PANEL else values for key, values in held.items()}
-    for other, maps in ((TURNED, turned), (BLANK, {})):
-        write_profile(maps, replace(base, name=f"{name}-{other}"), trial)
-    write_atomically(folder / WORK / f"{TRIAL}.yaml", _trial_text(photographed, name).encode())
+    for other, maps in zip(names[1:], (turned, {}), strict=True):
+        write_profile(maps, replace(base, name=other), trial)
     return profile
 
 
@@ -278,7 +298,7 @@ def _difference(captures: Sequence[Tensor], target: Tensor) -> float:
     return float((first - second).square().mean())
 
 
-def _trial_text(photographed: Photographed, name: str) -> str:
+def _trial_text(photographed: Photographed, names: Sequence[str]) -> str:
     """The config that shows the holograms of a display on its twin."""
     study = photographed.study
     rows: list[Mapping[str, Any]] = [
@@ -288,7 +308,7 @@ def _trial_text(photographed: Photographed, name: str) -> str:
     config = {
         "title": f"{photographed.display.name} on its twin",
         "seed": study.seed,
-        "display": {"profiles": [f"{TRIAL}/{file_name(each)}.yaml" for each in trial_names(name)]},
+        "display": {"profiles": [f"{TRIAL}/{file_name(each)}.yaml" for each in names]},
         "targets": {"dataset": study.targets.dataset, "params": dict(study.targets.params)},
         "methods": rows,
         "protocol": {"metrics": ["psnr", "ssim"]},
@@ -297,21 +317,25 @@ def _trial_text(photographed: Photographed, name: str) -> str:
     return yaml.safe_dump(config, sort_keys=False)
 
 
-def trial_names(name: str) -> tuple[str, str, str]:
-    """The displays of a trial: the twin, and those that it has to be better than."""
-    return name, f"{name}-{TURNED}", f"{name}-{BLANK}"
+def trial_names(name: str, photographed: Photographed) -> list[str]:
+    """The displays of a trial: the twin, and those that it has to be better than; a network has none."""
+    return [name, *(f"{name}-{other}" for other in (TURNED, BLANK) if photographed.row.name == "twin")]
 
 
-def publish(profile: Profile, folder: Path) -> Path:
+def publish(profile: Profile, photographed: Photographed, folder: Path) -> Path:
     """Write the twin with what is known of it; the first of its version, or the next where another was written before.
 
-    profile: of the trial, whose maps it has.
+    profile: of the trial, whose maps or network it has.
     """
-    held = load_maps(profile.maps, folder / WORK / TRIAL, _sizes(profile))
+    write: Callable[[Profile, Path], Path] = (
+        partial(write_profile, load_maps(profile.maps, folder / WORK / TRIAL, _sizes(profile)))
+        if profile.network.method is None
+        else partial(write_network, photographed.learned.state, profile.network.method, profile.network.params)
+    )
     path = folder / f"{file_name(profile.name)}.yaml"
     before = load(path).data if path.is_file() else {}
     version = before["version"] if isinstance(before.get("version"), int) else 0
-    write_profile(held, replace(profile, version=max(1, version)), folder)
+    write(replace(profile, version=max(1, version)), folder)
     if before and load(path).data != before:
-        write_profile(held, replace(profile, version=version + 1), folder)
+        write(replace(profile, version=version + 1), folder)
     return path

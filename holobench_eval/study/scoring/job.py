@@ -18,9 +18,7 @@ from ...core.device import find, gpu_name, moved
 from ...core.errors import CellError, Pending, reason
 from ...core.hashing import canonical
 from ...core.reads import Seen, recorded
-from ...display import CalibratedBench
 from ...display.learned import LearnedBench
-from ...lab.real import RealBench
 from .. import cost, isolation, opening
 from ..artifacts import Artifact, Artifacts
 from ..definition import Isolation, Limits, Save
@@ -141,7 +139,7 @@ class Job:
             raise CellError(f"not trained: {artifacts.failure(preparation)}")
         return artifacts.load(preparation)
 
-    def display(self, cell: Cell, display: Condition) -> CalibratedBench | RealBench | LearnedBench:
+    def display(self, cell: Cell, display: Condition) -> opening.Bench:
         """The display of a cell: a simulated bench, a real one, or a trained network."""
         preparation, learned = display.learned, self.learned(display.learned)
         if preparation is None or learned is None:

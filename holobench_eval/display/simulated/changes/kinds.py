@@ -241,6 +241,8 @@ def altered(profile: Profile, kind: str, value: Value) -> Profile:
         return profile
     changed = KINDS[kind].apply(profile, value)
     drawn = [((), "it draws other patterns, and the profile's maps stay")] if changed.seed != profile.seed else []
+    if profile.network.method:
+        raise UserError(f"{kind} does not suit '{profile.name}': it is a network, which nothing changes")
     for _, fault in (*changed.plane_faults(), *(drawn if profile.held else []), *changed.map_faults()):
         raise UserError(f"{kind} does not suit '{profile.name}': {fault}")
     return changed

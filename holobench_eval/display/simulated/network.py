@@ -1,0 +1,44 @@
+"""A learned predictor of captures as a display: the network file of a profile, in the place of all stages."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from annotated_types import Interval
+
+from ...core.errors import UserError
+from ...core.files import open_regular
+from .maps import LARGEST, inside
+
+
+@dataclass(frozen=True)
+class NetworkFile:
+    """What a method has learned of a display, and predicts captures with.
+
+    method: that has learned it, by its name in configs, null for a profile that has stages; version: of the method's
+    code; params: of the method; file: what it has learned, in the folder of the profile or below it; size: of the file,
+    at most 20 MB [bytes]; sha256: of the file, 64 hexadecimal digits.
+    """
+
+    method: str | None = None
+    version: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+    file: str = ""
+    size: Annotated[int, Interval(ge=0, le=LARGEST)] = 0
+    sha256: str = ""
+
+    def content(self, folder: Path) -> bytes:
+        """The file's bytes; folder: of the profile. UserError: it is elsewhere, or another than the profile says."""
+        path = inside(self.file, folder)
+        try:
+            with open_regular(path, LARGEST) as file:
+                content = file.read(LARGEST + 1)
+        except OSError as error:
+            raise UserError(f"{path} cannot be read: {error.strerror}") from error
+        if len(content) != self.size or hashlib.sha256(content).hexdigest() != self.sha256:
+            raise UserError(f"{path}: is not the file that the profile describes, by its size or SHA-256")
+        return content

@@ -1,0 +1,99 @@
+"""A trained method as a display that anyone can run: a profile with a network file (``display.simulated.network``)."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from ..core import plugins
+from ..core.device import moved
+from ..core.errors import UserError, reason
+from ..core.io import file_name, write_atomically
+from ..display import Profile
+from ..display.learned import LearnedBench
+from ..display.simulated.maps import LARGEST
+from .artifacts import read_tensors
+from .versions import method_version
+
+SHIPPED = "expected a method of this package that trains and predicts captures"
+
+
+def network_bench(profile: Profile, folder: Path, seed: int, device: torch.device) -> LearnedBench:
+    """The display of a profile, on its own panel.
+
+    folder: of the profile. UserError: its file is not as it says, or of other code of the method, or the method is not
+    installed.
+    """
+    given = profile.network
+    method = _method(given.method or "", given.params)
+    if (version := method_version(type(method))) != given.version:
+        told = f"was learned with the code '{given.version}' of {given.method}, and here is '{version}'"
+        raise UserError(f"'{profile.name}' {told}; learn it again with holoeval twin")
+    content = given.content(folder)
+    state = read_tensors(folder / given.file, io.BytesIO(content)).get("state")
+    if not isinstance(state, dict):
+        raise UserError(f"{folder / given.file}: holds nothing that a method has learned")
+    bench = LearnedBench(profile.spec(), method, moved(state, device), seed, device)
+    spec, colours = bench.spec, len(bench.spec.wavelengths)
+    try:
+        dark = bench.photograph(torch.zeros(colours, *spec.shape), torch.ones(colours, *spec.region.shape), "trial", 0)
+        fault = "" if dark.image.isfinite().all() else "it predicts numbers that are not finite"
+    except Exception as error:  # a file that is not of the method raises whatever it happens to lack
+        fault = reason(error)
+    if fault:
+        raise UserError(f"{folder / given.file}: not what {given.method} has learned of this panel: {fault}")
+    return bench
+
+
+def write_network(
+    state: Mapping[str, Any], method: str, params: Mapping[str, Any], base: Profile, folder: Path
+) -> Path:
+    """Write a profile of what a method has learned; the file's path.
+
+    base: its name, version, nominal panel, and what is known of it. UserError: a method that is not installed, or a
+    file of more than 20 MB.
+    """
+    version, stem, buffer = method_version(type(_method(method, params))), file_name(base.name), io.BytesIO()
+    torch.save({"state": dict(state)}, buffer)
+    content = buffer.getvalue()
+    if len(content) > LARGEST:
+        raise UserError(f"{method} has learned {len(content) / 1e6:.0f} MB; a display has at most {LARGEST / 1e6:g} MB")
+    sha256 = hashlib.sha256(content).hexdigest()
+    document = {
+        "name": base.name,
+        "version": base.version,
+        "seed": 0,
+        "description": base.description,
+        "panel": {key: value for key, value in asdict(base.panel).items() if key != "maps"},
+        "residual_bound": base.residual_bound,
+        "network": {
+            "method": method,
+            "version": version,
+            "params": dict(params),
+            "file": f"{stem}.pt",
+            "size": len(content),
+            "sha256": sha256,
+        },
+        **({"twin": asdict(base.twin)} if base.twin.of else {}),
+    }
+    write_atomically(folder / f"{stem}.pt", content)
+    lines = "".join(f"{key}: {json.dumps(value)}\n" for key, value in document.items())
+    write_atomically(folder / f"{stem}.yaml", lines.encode())
+    return folder / f"{stem}.yaml"
+
+
+def _method(name: str, params: Mapping[str, Any]) -> Any:
+    """UserError: it is a file of code, which a display must not bring with it, or one that predicts nothing."""
+    if not plugins.is_shipped("methods", name):
+        raise UserError(f"'{name}' cannot be a display; {SHIPPED}")
+    method = plugins.build("methods", name, dict(params), None)
+    if not hasattr(method, "predict") or not getattr(method, "trains", False):
+        raise UserError(f"'{name}' cannot be a display; {SHIPPED}")
+    return method

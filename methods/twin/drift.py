@@ -1,0 +1,57 @@
+"""What a display does while its photographs are taken: the power of its lasers varies, and its picture moves.
+
+Both are learned with the twin and left out of it: a twin is the display as its camera was registered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import torch
+from torch import Tensor
+
+from ...display.api import DisplaySpec
+from ..calibrated.approximator import ModelApproximator, Rates
+from ..learned.samples import Sample
+from .model import TwinCamera, TwinModel
+
+MISFIT = 0.005  # of the light, rms, that a twin errs in the brightness of a capture whose power is known
+
+
+class TwinApproximator(ModelApproximator):
+    """A twin and how it learns from captures of a display that drifts."""
+
+    terms: TwinCamera
+
+    def __init__(self, spec: DisplaySpec, rates: Rates) -> None:
+        super().__init__(TwinModel(spec), None, rates, TwinCamera(spec))
+
+    def expose(self, samples: Sequence[Sample]) -> None:
+        """Tell how much the power varies, from captures of one hologram."""
+        first = samples[0]
+        again = [sample.capture for sample in samples if torch.equal(sample.phase, first.phase)]
+        if len(again) > 1:
+            light = torch.stack([capture.mean((-2, -1)) for capture in again])
+            self.terms.power.copy_((light / light.mean(0)).var(0).mean().sqrt())
+
+    def step(self, sample: Sample, progress: float) -> dict[str, float]:
+        """See the base; the picture is where it was when the sample was captured."""
+        with taken(self.terms, sample):
+            return super().step(sample, progress)
+
+    def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
+        """See the base; of another brightness the share that the power is likely to have varied by is none."""
+        area, power = (-2, -1), self.terms.power.square()
+        ratio = (predicted * capture).sum(area, True) / predicted.square().sum(area, True)
+        return super().error(predicted * (1 + power / (power + MISFIT**2) * (ratio - 1)), capture)
+
+
+@contextmanager
+def taken(camera: TwinCamera, sample: Sample) -> Iterator[None]:
+    """The camera stands where it stood for a sample."""
+    camera.captures = sample.number
+    try:
+        yield
+    finally:
+        camera.captures = 0
