@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -165,28 +166,46 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
     assert not torch.equal(second["value"]["phase"], start["value"]["phase"])
 
 
+class Ending(Schedule):
+    """Ends with the first round after the first that predicts held-out captures by less than a decibel better."""
+
+    def ends(self, watched: Sequence[float]) -> bool:
+        return len(watched) > 1 and watched[-1] - watched[-2] < 1
+
+
 RESUMED = Schedule(3, images=2, refine_images=1, steps=4, refine_steps=4)
+ENDING = Ending(9, images=2, refine_images=1, steps=4, refine_steps=4)
 
 
-def ended(memory: Memory, fate: Fate | None = None) -> dict[str, Any]:
+def test_a_schedule_may_end_with_a_round() -> None:
+    memory = Memory()
+    run(training_bench(SPEC, memory), ENDING, memory)
+    watched = [float(row["fidelity_psnr"]) for row in memory.rows if "fidelity_psnr" in row]
+    assert 1 < len(watched) < 9
+    assert watched[-1] - watched[-2] < 1
+    assert all(later - earlier >= 1 for earlier, later in itertools.pairwise(watched[:-1]))
+
+
+def ended(memory: Memory, fate: Fate | None = None, rounds: Schedule = RESUMED) -> dict[str, Any]:
     """Of a training that goes on from what the memory holds: its state, its captures, its rows and all it kept."""
     bench = training_bench(SPEC, memory, fate)
-    state = run(bench, RESUMED, memory).state_dict()
+    state = run(bench, rounds, memory).state_dict()
     values = {name: memory.kept[name]["value"] for name in sorted(memory.kept)}
     return {"state": state, "captures": bench.captures, "rows": memory.story, "values": values}
 
 
-def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_values_and_rows() -> None:
+@pytest.mark.parametrize("rounds", [RESUMED, ENDING])
+def test_a_training_killed_at_any_moment_ends_with_the_same_state_captures_values_and_rows(rounds: Schedule) -> None:
     """Between photographs, in and between steps, around every save and row, in every round and with images held out."""
     undisturbed = Memory()
-    whole, moments = ended(undisturbed), undisturbed.fate.passed
+    whole, moments = ended(undisturbed, rounds=rounds), undisturbed.fate.passed
     assert len(moments) > 60
     for at in range(len(moments)):
         memory, fate = Memory(), Fate(at)
         with pytest.raises(Killed):
-            ended(memory, fate)
+            ended(memory, fate, rounds)
         assert fate.passed == moments[: at + 1]
-        assert same(ended(memory), whole), (at, moments[at])
+        assert same(ended(memory, rounds=rounds), whole), (at, moments[at])
 
 
 def test_a_training_killed_again_and_again_ends_the_same() -> None:
