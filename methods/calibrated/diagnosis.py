@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -12,8 +13,14 @@ from torch import Tensor
 from ...display.api import DisplaySpec
 from ...display.estimates import Estimate, disc, estimate, focusing, reach, stray, stroke, undiffracted, zernike_waves
 from ...optics.phase import TAU
+from ...optics.phasor import squared_modulus
 from ...optics.zernike import NAMES, zernike
 from .display_model import FORM, KNOTS, DisplayModel, enlarged
+
+
+def is_blocked(spec: DisplaySpec) -> bool:
+    """Whether the blaze moves unmodulated light away from the iris."""
+    return math.hypot(*spec.blaze) > (spec.pupil or math.inf) / 2
 
 
 class Diagnosed:
@@ -59,8 +66,9 @@ def _panel_estimates(model: DisplayModel, colour: int) -> list[Estimate]:
     gain = torch.exp(enlarged(model.gain, model.spec.shape)[colour]).double().mean()
     law = stroke(levels, (TAU * levels + model.table[colour, 1:-1]) * gain)
     ratio = complex(*model.undiffracted[colour].tolist())
-    beam = torch.exp(2 * enlarged(model.amplitude, model.spec.shape)[colour]).mean()
-    light = float(beam * torch.exp(model.brightness[colour])) * (1 + abs(ratio) ** 2)
+    beam = squared_modulus(model.illumination()[colour]).mean()
+    passed = 0.0 if is_blocked(model.spec) else 1.0
+    light = float(beam * torch.exp(model.brightness[colour])) * (1 + passed * abs(ratio) ** 2)
     turned = ratio * cmath.exp(-1j * TAU * law.offset)
     return [
         estimate("lut_exponent", colour, law.exponent),

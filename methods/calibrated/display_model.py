@@ -132,7 +132,7 @@ class DisplayModel(nn.Module):
         return Maps(
             torch.exp(enlarged(self.gain, self.spec.shape)),
             self._taps(),
-            self._illumination(),
+            self.illumination(),
             phasor(turned.new_ones(()), turned),
             torch.exp(self.brightness / 2)[:, None, None],
         )
@@ -158,7 +158,8 @@ class DisplayModel(nn.Module):
         share = torch.erf((offset + 0.5) / scale) - torch.erf((offset - 0.5) / scale)
         return share / share.sum(-1, keepdim=True)
 
-    def _illumination(self) -> Tensor:
+    def illumination(self) -> Tensor:
+        """Amplitude and phase of the light on the panel, ``(C, H, W)`` complex, without the camera's gain."""
         shape = self.spec.shape
         return torch.exp(enlarged(self.amplitude, shape)) * phasor(self.angle.new_ones(()), enlarged(self.angle, shape))
 

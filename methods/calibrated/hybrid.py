@@ -32,9 +32,10 @@ class FinePanel(DisplayModel):
         super().__init__(spec)
         self.fine = nn.Parameter(torch.zeros(2, len(spec.wavelengths), *spec.shape))
 
-    def _illumination(self) -> Tensor:
+    def illumination(self) -> Tensor:
+        """See the base."""
         amplitude, angle = self.fine
-        return super()._illumination() * torch.exp(amplitude) * phasor(angle.new_ones(()), angle)
+        return super().illumination() * torch.exp(amplitude) * phasor(angle.new_ones(()), angle)
 
 
 class Residual(nn.Module):

@@ -17,6 +17,7 @@ from ..learned.samples import Sample
 from .model import TwinCamera, TwinModel
 
 MISFIT = 0.005  # of the light, rms, that a twin errs in the brightness of a capture whose power is known
+DIMMEST = 0.01  # of the prediction, below which a capture is not told from a dark one
 
 
 class TwinApproximator(ModelApproximator):
@@ -41,10 +42,14 @@ class TwinApproximator(ModelApproximator):
             return super().step(sample, progress)
 
     def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
-        """See the base; of another brightness the share that the power is likely to have varied by is none."""
-        area, power = (-2, -1), self.terms.power.square()
+        """See the base. Of another brightness, the share that power is likely to have is no error in the picture; it is
+        a small one by itself, whose least sum is at the median of all captures, and so holds the light of the twin."""
+        area, power = (-2, -1), self.terms.power
         ratio = (predicted * capture).sum(area, True) / predicted.square().sum(area, True)
-        return super().error(predicted * (1 + power / (power + MISFIT**2) * (ratio - 1)), capture)
+        share = power.square() / (power.square() + MISFIT**2)
+        apart = ratio.clamp_min(DIMMEST).log().abs().mean()
+        own = super().error(predicted * (1 + share * (ratio - 1)), capture)
+        return own + share * MISFIT / (power + MISFIT) * apart
 
 
 @contextmanager

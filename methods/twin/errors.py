@@ -21,7 +21,7 @@ from ...display.api import DisplaySpec
 from ...display.estimates import QUANTITIES, Estimate
 from ...optics.phase import TAU
 from ..calibrated.approximator import PredictedCapture
-from ..calibrated.diagnosis import diagnose, haze
+from ..calibrated.diagnosis import diagnose, haze, is_blocked
 from ..calibrated.display_model import KNOTS
 from ..learned.samples import Sample
 from .drift import taken
@@ -77,9 +77,7 @@ def _spread(name: str, first: Sequence[Estimate], second: Sequence[Estimate]) ->
 def unseen(model: TwinModel, camera: TwinCamera, samples: Sequence[Sample]) -> list[str]:
     """Quantities of which a change by their usual error changes captures by next to nothing; and unmodulated light that
     the blaze moves away from the iris, of which the edges of the panel alone tell."""
-    spec = model.spec
-    is_blocked = math.hypot(*spec.blaze) > (spec.pupil or math.inf) / 2
-    found = [name for name in NUDGES if is_blocked and name.startswith("undiffracted")]
+    found = [name for name in NUDGES if is_blocked(model.spec) and name.startswith("undiffracted")]
     looked_at = samples[:: max(1, len(samples) // LOOKED_AT)]
     before = [_shown(model, camera, sample) for sample in looked_at]
     left = sum(float((image - sample.capture).square().mean()) for image, sample in zip(before, looked_at, strict=True))

@@ -70,9 +70,10 @@ class TwinModel(DisplayModel):
         """Logarithm of the amplitude, and phase [rad], ``(2, C, *shape)``, of the light besides its smooth maps."""
         return FINE * torch.stack([each if each.shape[1:] == shape else enlarged(each, shape) for each in self.specks])
 
-    def _illumination(self) -> Tensor:
+    def illumination(self) -> Tensor:
+        """See the base."""
         amplitude, angle = self.dirt(self.spec.shape)
-        return super()._illumination() * torch.exp(amplitude) * phasor(angle.new_ones(()), angle)
+        return super().illumination() * torch.exp(amplitude) * phasor(angle.new_ones(()), angle)
 
     def _driven(self, phase: Tensor) -> Tensor:
         bits = self.spec.bits

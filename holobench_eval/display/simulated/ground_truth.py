@@ -22,8 +22,8 @@ def truth(bench: SimulatedBench) -> list[Estimate]:
 
     lut_exponent, phase_gain: those of the profile, today's drift included; of a published table, the nearest law.
     undiffracted: zero order and dead area together, as far as the iris lets them pass.
-    light: power from the panel, modulated and unmodulated, after dust and laser drift, times the mean response of the
-    sensor's pixels.
+    light: power from the panel, modulated and unmodulated as far as the iris lets it pass, after dust and laser drift,
+    times the mean response of the sensor's pixels.
     stray: share and reach of the stage.
     Zernikes: aberration, and errors of distance and wavelength, over the iris, and the second order of the beam's
     phase as ``estimates.focusing`` has it; none where there is no iris, in a Fourier plane.
@@ -39,7 +39,7 @@ def _panel_truth(bench: SimulatedBench, colour: int) -> list[Estimate]:
     law = stroke(levels, profile.lut.phase(levels * 2**profile.panel.bits, profile.panel.bits, gain, colour))
     modulated, unmodulated = complex(maps.light.modulated.mean()), complex(maps.light.unmodulated.mean())
     incident = sum(float(line.light.incident.abs().square().mean()) for line in bench.lines[colour])
-    light = (abs(modulated) ** 2 + abs(unmodulated) ** 2) * incident
+    light = (abs(modulated) ** 2 + abs(unmodulated * _passed(bench)) ** 2) * incident
     return [
         estimate("lut_exponent", colour, law.exponent),
         estimate("phase_gain", colour, law.gain),

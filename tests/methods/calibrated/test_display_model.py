@@ -170,7 +170,7 @@ def test_defocus_is_a_change_of_distance(colour: int, pupil: float | None) -> No
     y, x = torch.meshgrid(*(torch.linspace(-1, 1, 96),) * 2, indexing="ij")
     model = sharp(near)
     spot = torch.exp(-((x / 0.15).square() + (y / 0.2).square()))
-    model._illumination = lambda: spot.expand(2, 96, 96)  # type: ignore[method-assign]
+    model.illumination = lambda: spot.expand(2, 96, 96)  # type: ignore[method-assign]
     phase = (2 + 1.5 * torch.sin(12 * x + 5 * y)).expand(2, 96, 96)
     further = AngularSpectrum(near.shape, near.pitch, near.wavelengths[colour], near.distance + moved, pupil=pupil)
     expected = near.region.crop(further.forward(spot * on_panel(phase[colour]))).abs().square()

@@ -63,6 +63,15 @@ def test_power_that_varies_is_told_by_one_hologram_and_not_learned() -> None:
     assert sum(last[:8]) < 0.5 * sum(last[8:])
 
 
+def test_the_light_of_a_display_whose_power_varies_is_found() -> None:
+    samples = [replace(sample, capture=0.7 * sample.capture) for sample in photographs((0.0, 0.0), POWER)]
+    approximator = fitted(samples)
+    with torch.no_grad():
+        predicted = torch.stack([approximator.image(sample.light)(sample.phase).mean() for sample in samples])
+    wanted = torch.stack([sample.capture.mean() for sample in samples])
+    assert float(predicted.mean() / wanted.mean()) == pytest.approx(1.0, abs=0.02)
+
+
 def test_captures_of_a_steady_display_have_their_full_brightness() -> None:
     approximator = fitted(photographs((0.0, 0.0), 0.0))
     assert float(approximator.terms.power) < 1e-6
