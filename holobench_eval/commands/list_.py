@@ -214,7 +214,8 @@ def explain_profile(screen: Console, name: str) -> None:
     except UserError as error:
         screen.print(escape(str(error)), highlight=False)
     else:
-        screen.print(f"holoeval show {name} draws them.", highlight=False)
+        if profile.network.method is None:
+            screen.print(f"holoeval show {name} draws them.", highlight=False)
 
 
 def explain_metric(screen: Console, name: str) -> None:

@@ -6,7 +6,7 @@ import itertools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import torch
 from torch import Tensor
@@ -19,6 +19,7 @@ from .api import Camera, Display, DisplaySpec, white_irradiance
 from .metered import Known, OpenLoop, Solver
 from .phases import check_phase
 
+Clock = Literal["kept", "opened", "none"]
 Value = dict[str, Any]
 """Tensors, numbers, text, and lists and mappings of them: what can be kept in a file without code."""
 
@@ -57,7 +58,7 @@ class TrainingBench:
     images: to train with; held_out: captured only to watch how well the captures of unseen images are predicted.
     budget: captures that may be taken, None for no limit; what is kept has its captures counted once. seed: the
     study's. known: of images by name, see ``MeteredDisplay``. journal: where captures are counted beside those of
-    attempts that were cut short, see ``Journal``.
+    attempts that were cut short, see ``Journal``. clock: see ``number``.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class TrainingBench:
         seed: int,
         known: Mapping[str, Known] | None = None,
         journal: Journal | None = None,
+        clock: Clock = "kept",
     ) -> None:
         self.images = tuple(images)
         self.held_out = tuple(held_out)
@@ -80,6 +82,7 @@ class TrainingBench:
         self._account = Account(label, budget, " for training", journal)
         self._seed = seed
         self._known = known
+        self._clock, self._taken = clock, 0
         self._spent = 0.0
         self._started = time.perf_counter()
 
@@ -97,6 +100,12 @@ class TrainingBench:
     def captures(self) -> int:
         """Captures taken so far, those before an interruption included, but for what was not kept then."""
         return self._account.captures
+
+    @property
+    def number(self) -> int:
+        """Of the last capture, among all (``kept``), or among those since the bench was opened, whose camera is then
+        registered anew (``opened``); 0 where people photograph in an order of their own (``none``)."""
+        return {"kept": self.captures, "opened": self._taken, "none": 0}[self._clock]
 
     @property
     def seconds(self) -> float:
@@ -131,6 +140,7 @@ class TrainingBench:
         check_phase(phase, self.spec, self._label)
         camera = self._camera(image, *names)
         self._account.take()
+        self._taken += 1
         return self._display.rectified(camera.capture(phase.detach()), image.target)
 
     def announce(self, photographs: Iterable[tuple[Tensor, TrainingImage, tuple[object, ...]]]) -> None:

@@ -44,10 +44,9 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             heading("Differences of two methods"),
             _pairs(found),
             *(_others(found) if less else []),
-            heading("What it says of the display"),
-            *_parameters(photographed),
+            *_parameters(photographed, less),
             heading("How to use it"),
-            bullets(_use(found, profile)),
+            bullets(_use(found, profile, less)),
         ]
     )
     write_atomically(path, f"{text}\n".encode())
@@ -124,9 +123,14 @@ def _others(found: Trial) -> Iterable[Markdown | str]:
     )
 
 
-def _parameters(photographed: Photographed) -> Iterable[Markdown | str]:
+def _parameters(photographed: Photographed, in_halves: bool) -> Iterable[Markdown | str]:
     rows = photographed.learned.provenance.get("estimates") or []
+    if not rows:
+        return
+    yield heading("What it says of the display")
     yield quantities(rows)
+    if not in_halves:
+        return
     hidden = [QUANTITIES[row["name"]].words for row in rows if row.get("seen") is False]
     yield (
         "Stated errors are meant to hold with 90 %: how far fits to halves of the photographs, of different holograms, "
@@ -136,7 +140,7 @@ def _parameters(photographed: Photographed) -> Iterable[Markdown | str]:
         yield f"No photograph shows: {', '.join(dict.fromkeys(hidden))}."
 
 
-def _use(found: Trial, profile: Path) -> Iterable[str | Markdown]:
+def _use(found: Trial, profile: Path, has_equations: bool) -> Iterable[str | Markdown]:
     yield Markdown("In a config: {}; with every command that takes a display: {}.").format(
         code(f"display: {{profiles: [{profile.name}]}}"), code(f"--display {profile.name}")
     )
@@ -144,7 +148,8 @@ def _use(found: Trial, profile: Path) -> Iterable[str | Markdown]:
         f"It has learned {found.of} from {found.photographs} photographs, on this panel: a smaller one is refused, a "
         "larger one becomes this. What drifts or flickers on the display does not do so here."
     )
-    yield "Methods that have the equations of the bench fit a twin better than the display: expect less there."
+    alike = "have the equations of the bench fit a twin" if has_equations else "resemble the network fit it"
+    yield f"Methods that {alike} better than the display: expect less there."
 
 
 def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: Trial) -> None:

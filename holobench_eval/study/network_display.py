@@ -18,37 +18,35 @@ from ..core.errors import UserError, reason
 from ..core.io import file_name, write_atomically
 from ..display import Profile
 from ..display.learned import LearnedBench
-from ..display.simulated.maps import LARGEST
+from ..display.simulated.network import LARGEST
 from .artifacts import read_tensors
 from .versions import method_version
 
 SHIPPED = "expected a method of this package that trains and predicts captures"
 
 
-def network_bench(profile: Profile, folder: Path, seed: int, device: torch.device) -> LearnedBench:
-    """The display of a profile, on its own panel.
+def network_bench(profile: Profile, seed: int, device: torch.device) -> LearnedBench:
+    """The display of a loaded profile, on its own panel.
 
-    folder: of the profile. UserError: its file is not as it says, or of other code of the method, or the method is not
-    installed.
+    UserError: its file is not as it says, or of other code of the method, or the method is not of this package.
     """
-    given = profile.network
-    method = _method(given.method or "", given.params)
+    given, path = profile.network, Path(profile.network.file)
+    method = predictor(given.method or "", given.params)
     if (version := method_version(type(method))) != given.version:
         told = f"was learned with the code '{given.version}' of {given.method}, and here is '{version}'"
         raise UserError(f"'{profile.name}' {told}; learn it again with holoeval twin")
-    content = given.content(folder)
-    state = read_tensors(folder / given.file, io.BytesIO(content)).get("state")
+    state = read_tensors(path, io.BytesIO(given.content(path))).get("state")
     if not isinstance(state, dict):
-        raise UserError(f"{folder / given.file}: holds nothing that a method has learned")
-    bench = LearnedBench(profile.spec(), method, moved(state, device), seed, device)
-    spec, colours = bench.spec, len(bench.spec.wavelengths)
+        raise UserError(f"{path}: holds nothing that a method has learned")
+    spec, colours = profile.spec(), len(profile.panel.wavelengths)
     try:
+        bench = LearnedBench(spec, method, moved(state, device), seed, device)
         dark = bench.photograph(torch.zeros(colours, *spec.shape), torch.ones(colours, *spec.region.shape), "trial", 0)
         fault = "" if dark.image.isfinite().all() else "it predicts numbers that are not finite"
     except Exception as error:  # a file that is not of the method raises whatever it happens to lack
         fault = reason(error)
     if fault:
-        raise UserError(f"{folder / given.file}: not what {given.method} has learned of this panel: {fault}")
+        raise UserError(f"{path}: not what {given.method} has learned of this panel: {fault}")
     return bench
 
 
@@ -58,9 +56,9 @@ def write_network(
     """Write a profile of what a method has learned; the file's path.
 
     base: its name, version, nominal panel, and what is known of it. UserError: a method that is not installed, or a
-    file of more than 20 MB.
+    file of more than 100 MB.
     """
-    version, stem, buffer = method_version(type(_method(method, params))), file_name(base.name), io.BytesIO()
+    version, stem, buffer = method_version(type(predictor(method, params))), file_name(base.name), io.BytesIO()
     torch.save({"state": dict(state)}, buffer)
     content = buffer.getvalue()
     if len(content) > LARGEST:
@@ -89,8 +87,11 @@ def write_network(
     return folder / f"{stem}.yaml"
 
 
-def _method(name: str, params: Mapping[str, Any]) -> Any:
-    """UserError: it is a file of code, which a display must not bring with it, or one that predicts nothing."""
+def predictor(name: str, params: Mapping[str, Any]) -> Any:
+    """The method that a display is predicted by.
+
+    UserError: it is a file of code, which a display must not bring with it, or one that predicts nothing.
+    """
     if not plugins.is_shipped("methods", name):
         raise UserError(f"'{name}' cannot be a display; {SHIPPED}")
     method = plugins.build("methods", name, dict(params), None)

@@ -12,7 +12,6 @@ from ..display import CalibratedBench, Profile, load_profile
 from ..display.learned import LearnedBench
 from ..display.simulated.changes import KINDS, altered
 from ..display.simulated.pipeline import SimulatedBench
-from ..display.simulated.profile import profile_files
 from ..lab.bench_file import load_bench_file
 from ..lab.live import open_live
 from ..lab.real import RealBench
@@ -98,7 +97,7 @@ def _opened(display: Condition, seed: int, device: torch.device) -> Bench | Cell
     if profile.digest != display.digest:
         raise UserError(f"profile '{display.source}' has changed since the study was planned; start the run again")
     if display.network:
-        return network_bench(profile, profile_files(display.source, display.folder)[0].parent, seed, device)
+        return network_bench(profile, seed, device)
     unmoved = None
     try:
         if display.change is not None:

@@ -95,6 +95,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         preparation.seed,
         shared,
         journal,
+        "none" if preparation.display.in_session else "opened" if preparation.display.real else "kept",
     )
     with (
         guarded(preparation.method, setting.isolation, preparation.display, preparation.seed),

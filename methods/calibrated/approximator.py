@@ -104,6 +104,10 @@ class ModelApproximator:
         held = copy.deepcopy(self._capture).requires_grad_(False)
         return lambda phase: held(phase, light)
 
+    def predicted(self, sample: Sample) -> Tensor:
+        """What is expected of the capture of a sample, ``(C, h, w)``."""
+        return self.image(sample.light)(sample.phase)
+
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         return {**self.learned(), "optimiser": self._optimiser.state_dict()["state"]}

@@ -120,6 +120,10 @@ class NetworkApproximator:
 
         return display
 
+    def predicted(self, sample: Sample) -> Tensor:
+        """What is expected of the capture of a sample, ``(C, h, w)``."""
+        return self.image(sample.light)(sample.phase)
+
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         critic = None if self.critic is None else self.critic.state_dict()

@@ -17,7 +17,7 @@ def fidelity(approximator: Approximator, samples: Sequence[Sample]) -> dict[str,
     rows = []
     for sample in samples:
         with torch.no_grad():
-            predicted = approximator.image(sample.light)(sample.phase)
+            predicted = approximator.predicted(sample)
         capture = matched(sample.capture, sample.target)
         pairs = ((predicted, sample.target), (sample.capture, sample.target), (predicted, capture))
         rows.append([matched_psnr(*pair) for pair in pairs])

@@ -82,7 +82,7 @@ class Sample:
     light : Tensor
         ``(C,)``, that of a white pixel which all of the panel's light went into, the unit of the capture.
     number : int
-        Of the capture, in the order in which all captures of a training were taken.
+        Of the capture, in the order in which those of a training were taken; 0 where it is not known.
     """
 
     phase: Tensor
@@ -106,6 +106,9 @@ class Approximator(Protocol):
 
     def image(self, light: Tensor) -> Image:
         """The display with the weights as they are now, held: phase to predicted capture."""
+
+    def predicted(self, sample: Sample) -> Tensor:
+        """What it expects of the capture of a sample, ``(C, h, w)``."""
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
@@ -131,7 +134,7 @@ def captured(
     bench.announce((phase, image, names) for phase, image in zip(phases, images, strict=True))
     for key, phase, image in zip(keys, phases, images, strict=True):
         kept = bench.kept(key, partial(_photograph, bench, phase, image, *names))
-        yield Sample(phase, kept["capture"], image.target, bench.light(image), kept["number"])
+        yield Sample(phase, kept["capture"], image.target, bench.light(image), kept.get("number", 0))
 
 
 def together(*kinds: Callable[[], Sequence[Sample]]) -> list[Sample]:
@@ -149,4 +152,4 @@ def together(*kinds: Callable[[], Sequence[Sample]]) -> list[Sample]:
 
 
 def _photograph(bench: TrainingBench, phase: Tensor, image: TrainingImage, *names: object) -> dict[str, Any]:
-    return {"capture": bench.photograph(phase, image, *names), "number": bench.captures}
+    return {"capture": bench.photograph(phase, image, *names), "number": bench.number}

@@ -67,7 +67,10 @@ class Through(BenchDescent):
 
     def refuse_display(self, spec: DisplaySpec) -> None:
         """UserError for a display of other nominal optics than the profile's, on the same panel, in one line."""
-        own = load_profile(self.profile, self._folder).spec(spec.shape)
+        profile = load_profile(self.profile, self._folder)
+        if profile.network.method:
+            raise UserError(f"profile '{self.profile}' is a network, which has no stages to descend through")
+        own = profile.spec(spec.shape)
         if faults := list(_differences(own, spec)):
             raise UserError(f"profile '{self.profile}' is no model of '{spec.name}': {'; '.join(faults)}")
 

@@ -28,18 +28,20 @@ class TwinApproximator(ModelApproximator):
     def __init__(self, spec: DisplaySpec, rates: Rates) -> None:
         super().__init__(TwinModel(spec), None, rates, TwinCamera(spec))
 
-    def expose(self, samples: Sequence[Sample]) -> None:
-        """Tell how much the power varies, from captures of one hologram."""
-        first = samples[0]
-        again = [sample.capture for sample in samples if torch.equal(sample.phase, first.phase)]
-        if len(again) > 1:
-            light = torch.stack([capture.mean((-2, -1)) for capture in again])
-            self.terms.power.copy_((light / light.mean(0)).var(0).mean().sqrt())
+    def steadied(self, again: Sequence[Sample]) -> None:
+        """Tell how much the power varies, from two or more captures of one hologram."""
+        light = torch.stack([sample.capture.mean((-2, -1)) for sample in again])
+        self.terms.power.copy_((light / light.mean(0)).var(0).mean().sqrt())
 
     def step(self, sample: Sample, progress: float) -> dict[str, float]:
         """See the base; the picture is where it was when the sample was captured."""
         with taken(self.terms, sample):
             return super().step(sample, progress)
+
+    def predicted(self, sample: Sample) -> Tensor:
+        """See the base; where the picture was then."""
+        with taken(self.terms, sample):
+            return super().predicted(sample)
 
     def error(self, predicted: Tensor, capture: Tensor) -> Tensor:
         """See the base. Of another brightness, the share that power is likely to have is no error in the picture; it is

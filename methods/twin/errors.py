@@ -30,6 +30,7 @@ from .model import TwinCamera, TwinModel
 QUANTILE = 2.35  # of Student's t, 90 % of which lie within: a spread over three colours
 FAINTEST = 0.01  # of what a fit leaves of a capture: a smaller change is not seen
 MISFIT = 1 / 3  # of the usual error of a quantity: left on leto-aged, leto-2020-01 and leto-2020-03, 144 px
+OF_REACH = 1 / 2  # of that of the haze's reach: left on leto-2020
 LOOKED_AT = 6  # captures, or a few more, of all kinds
 
 
@@ -37,7 +38,9 @@ def estimates(learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
     """What a twin says of its display, with the errors; infinite for what no capture shows."""
     whole, *halves = (_quantities(state, spec) for state in (learned, *learned["halves"]))
     errors = {name: math.inf if name in learned["unseen"] else _spread(name, *halves) for name in names(whole)}
-    return [replace(item, error=errors[item.name]) for item in whole]
+    lost = errors["stray_share"]  # of light, what goes into haze is lost in part
+    more = {"light": lost if math.isfinite(lost) else QUANTITIES["stray_share"].error}
+    return [replace(item, error=errors[item.name] + more.get(item.name, 0.0) * item.value) for item in whole]
 
 
 def names(items: Iterable[Estimate]) -> list[str]:
@@ -70,7 +73,7 @@ def _spread(name: str, first: Sequence[Estimate], second: Sequence[Estimate]) ->
     if not apart:
         return math.inf
     spread = QUANTILE * math.sqrt(sum(each**2 for each in apart) / len(apart)) / 2
-    return max(spread, MISFIT * QUANTITIES[name].error)
+    return max(spread, (OF_REACH if name == "stray_reach" else MISFIT) * QUANTITIES[name].error)
 
 
 @torch.no_grad()

@@ -13,7 +13,7 @@ from annotated_types import Interval
 from ...display.api import DisplaySpec
 from ...display.estimates import Estimate
 from ...display.training import TrainingBench
-from ..calibrated.approximator import Rates
+from ..calibrated.approximator import ModelApproximator, Rates
 from ..calibrated.display_model import FORM
 from ..calibrated.method import ShortSchedule, ThroughModel
 from ..calibrated.patterns import dark_samples, pattern_samples
@@ -121,6 +121,12 @@ class Twin(ThroughModel):
     def estimates(self, learned: Mapping[str, Any], spec: DisplaySpec) -> list[Estimate]:
         """What it says of the display ``spec``, with errors."""
         return estimates(learned, spec)
+
+    def _samples(self, approximator: ModelApproximator, bench: TrainingBench) -> Sequence[Sample]:
+        samples, first = super()._samples(approximator, bench), 0 if self.patterns else 1
+        if isinstance(approximator, TwinApproximator):
+            approximator.steadied([pattern_samples(bench, 1, number)[0] for number in range(first, 3)])
+        return samples
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:
         again = [partial(pattern_samples, bench, 1, number) for number in (1, 2)]

@@ -128,9 +128,21 @@ class TwinCamera(ImageTerms):
         _, height, width = self.places.shape
         moved = enlarged(self.moved, (height, width)) + self.drift[:, None, None] * (self.captures / 100)
         at = (self.places + moved) * FINER
+        if not image.is_cpu:
+            return picked(image, at)
         ends = at.new_tensor([side - 1 for side in image.shape[-2:]])[:, None, None]
         grid = (2 * at / ends - 1).flip(0).permute(1, 2, 0).expand(len(image), -1, -1, -1)
         return functional.grid_sample(image[:, None], grid, "bilinear", "border", align_corners=True)[:, 0]
+
+
+def picked(image: Tensor, at: Tensor) -> Tensor:
+    """Images ``(C, H, W)`` at places ``(2, h, w)`` [px] by bilinear interpolation, with the edges beyond them:
+    ``grid_sample`` from pixels picked by index, whose gradient is deterministic on a GPU."""
+    down, across = (axis.clamp(0, side - 1) for axis, side in zip(at, image.shape[-2:], strict=True))
+    top, left = (axis.floor().clamp_max(side - 2) for axis, side in zip((down, across), image.shape[-2:], strict=True))
+    (above, below), (before, after) = (((1 - share)[None], share[None]) for share in (down - top, across - left))
+    upper, lower = ([image[:, (top + i).long(), (left + j).long()] for j in (0, 1)] for i in (0, 1))
+    return above * (before * upper[0] + after * upper[1]) + below * (before * lower[0] + after * lower[1])
 
 
 def finer(field: Tensor) -> Tensor:

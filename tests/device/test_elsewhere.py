@@ -216,6 +216,7 @@ TRAINED: dict[str, dict[str, Any]] = {
     "learned_kernel": STEPS | {"training": SHORT, "search": {"iterations": 1}},
     "cnn_prop_cnn": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},
     "hybrid_model": STEPS | {"training": SHORT, "patterns": 1, "search": {"iterations": 1}},
+    "twin": STEPS | {"training": SHORT, "patterns": 1, "holograms": 1, "search": {"iterations": 1}},
 }
 
 

@@ -42,8 +42,10 @@ def table(study: str, displays: list[str]) -> str:
     for label in ROWS:
         rows = [found[display].get(label) for display in displays]
         row = next(filter(None, rows))
+        counts = sorted({round(each["photographs"]) for each in rows if each})  # a twin stops by itself
+        photographs = " to ".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))
         cells = " | ".join(cell for row in rows for cell in cells_of(row))
-        lines.append(f"| {row['title']} (`{row['registered']}`) | {row['photographs']:.0f} | {cells} |")
+        lines.append(f"| {row['title']} (`{row['registered']}`) | {photographs} | {cells} |")
     return "\n".join(lines)
 
 

@@ -108,6 +108,18 @@ def without_state(folder: Path) -> None:
     described(folder)
 
 
+def without_end(folder: Path) -> None:
+    endless: list[Any] = []
+    endless.append(endless)
+    torch.save({"state": {"model": endless}}, folder / "net.pt")
+    described(folder)
+
+
+def without_values(folder: Path) -> None:
+    torch.save({"state": {"model": {"table": torch.empty(3, 17, device="meta")}}}, folder / "net.pt")
+    described(folder)
+
+
 def of_code(folder: Path) -> None:
     torch.save({"state": Wirtinger()}, folder / "net.pt")
     described(folder)
@@ -131,6 +143,8 @@ FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
     "a link": (linked, "is a link that leaves the profile's folder"),
     "a place outside": (lambda folder: rewrite(folder / "net.yaml", network={"file": "../net.pt"}), "is not a file in"),
     "no state": (without_state, "holds nothing that a method has learned"),
+    "a list in itself": (without_end, "not what parametric_model has learned"),
+    "tensors without values": (without_values, "not what parametric_model has learned"),
     "code": (of_code, "damaged, or not a file of tensors"),
     "other shapes": (lambda folder: rewritten(folder, lambda values: values[..., :1]), "not what parametric_model has"),
     "no numbers": (lambda folder: rewritten(folder, lambda values: values * float("nan")), "that are not finite"),
@@ -138,7 +152,7 @@ FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
     "a method of a file": (lambda folder: rewrite(folder / "net.yaml", network={"method": "m.py:M"}), "expected a me"),
     "no predictor": (lambda folder: rewrite(folder / "net.yaml", network={"method": "sgd"}), "expected a method of"),
     "stages": (lambda folder: rewrite(folder / "net.yaml", crosstalk={"width": 0.4}), "has no effect beside a network"),
-    "a huge size": (lambda folder: rewrite(folder / "net.yaml", network={"size": 10**9}), "20000000"),
+    "a huge size": (lambda folder: rewrite(folder / "net.yaml", network={"size": 10**9}), "100000000"),
 }
 
 
@@ -152,6 +166,25 @@ def test_a_file_that_is_not_as_it_should_be_is_refused_in_one_line(
         run(config)
     assert fault in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_profile_that_is_like_it_has_its_network_from_there(folder: Path) -> None:
+    (folder / "below").mkdir()
+    (folder / "below" / "like.yaml").write_text("like: ../net.yaml\nname: like\nversion: 1\ndescription: Alike.\n")
+    assert isinstance(open_display(condition("below/like.yaml", None, folder), seed=0), LearnedBench)
+
+
+def test_a_file_that_is_not_there_is_told_when_the_profile_is_read(folder: Path) -> None:
+    (folder / "net.pt").unlink()
+    with pytest.raises(UserError, match=r"^net\.yaml:\d+:\d+: .*cannot be read: No such file or directory$"):
+        load_profile("net.yaml")
+
+
+def test_no_method_descends_through_it(folder: Path) -> None:
+    rows = {"display": "{profiles: [ideal], panel: [128, 160]}"}
+    config = write_study(folder / "study.yaml", "{name: through, params: {profile: net.yaml}}", **rows)
+    with pytest.raises(UserError, match="is a network, which has no stages to descend through"):
+        load_study(config)
 
 
 def test_no_bench_is_built_of_it(folder: Path) -> None:

@@ -12,7 +12,9 @@ from annotated_types import Interval
 
 from ...core.errors import UserError
 from ...core.files import open_regular
-from .maps import LARGEST, inside
+from .maps import inside
+
+LARGEST = 100_000_000  # bytes of a file: all methods of this package on a panel of 1080 x 1920
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class NetworkFile:
 
     method: that has learned it, by its name in configs, null for a profile that has stages; version: of the method's
     code; params: of the method; file: what it has learned, in the folder of the profile or below it; size: of the file,
-    at most 20 MB [bytes]; sha256: of the file, 64 hexadecimal digits.
+    at most 100 MB [bytes]; sha256: of the file, 64 hexadecimal digits.
     """
 
     method: str | None = None
@@ -31,9 +33,14 @@ class NetworkFile:
     size: Annotated[int, Interval(ge=0, le=LARGEST)] = 0
     sha256: str = ""
 
-    def content(self, folder: Path) -> bytes:
-        """The file's bytes; folder: of the profile. UserError: it is elsewhere, or another than the profile says."""
+    def found(self, folder: Path) -> Path:
+        """The file's path; folder: of the profile. UserError: it is elsewhere, or another than the profile says."""
         path = inside(self.file, folder)
+        self.content(path)
+        return path
+
+    def content(self, path: Path) -> bytes:
+        """The file's bytes. UserError: it cannot be read, or is another than the profile says."""
         try:
             with open_regular(path, LARGEST) as file:
                 content = file.read(LARGEST + 1)

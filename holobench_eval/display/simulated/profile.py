@@ -240,6 +240,8 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
     if profile.maps.file is not None:
         profile = _with_maps(profile, documents)
+    if profile.network.method is not None:
+        profile = _with_network(profile, documents)
     trust = profile.twin if "twin" in documents[-1].data else Trust()  # of this file, and of none that is like it
     return replace(profile, twin=trust, digest=hashlib.sha256(text.encode()).hexdigest())
 
@@ -285,6 +287,16 @@ def _with_maps(profile: Profile, documents: Sequence[Document]) -> Profile:
     for where, fault in profile.map_faults():
         raise documents[-1].error(where, fault)
     return profile
+
+
+def _with_network(profile: Profile, documents: Sequence[Document]) -> Profile:
+    """The profile with the path of its network, in the folder of the last document that speaks of it."""
+    named = [each for each in documents if "network" in each.data][-1]
+    try:
+        path = profile.network.found(Path(named.name).parent)
+    except UserError as error:
+        raise named.error(("network", "file"), str(error)) from error
+    return replace(profile, network=replace(profile.network, file=str(path)))
 
 
 def _documents(name: str, folder: Path | None) -> list[Document]:

@@ -33,7 +33,7 @@ from ..definition import MethodEntry, Study
 from ..displays import Condition, displays
 from ..folders.session import ARTIFACTS, REPORT, study_of
 from ..isolation import traits
-from ..network_display import write_network
+from ..network_display import predictor, write_network
 from ..opening import open_bench
 from ..plan import Cell, Plan, plan
 from ..scoring.scores import kept_capture
@@ -220,7 +220,8 @@ def refuse(name: str, photographed: Photographed, folder: Path) -> None:
     display = photographed.display
     if replace(nominal(name, photographed).spec(), name=display.spec.name) != display.spec:
         raise UserError(f"'{display.name}': a display that is seen through a known lens has no twin")
-    _ = photographed.label
+    if photographed.row.name != "twin":
+        predictor(photographed.row.name, photographed.row.params)
     own = folder / f"{file_name(name)}.yaml"
     twin = load(own).data.get("twin") if own.is_file() else {"of": display.name}
     if not isinstance(twin, Mapping) or twin.get("of") != display.name:

@@ -47,6 +47,9 @@ class Scale:
         weight = self.weight.clone()
         return lambda phase: weight * SPEC.region.crop(1 + torch.cos(phase)) / light.view(-1, 1, 1)
 
+    def predicted(self, sample: Sample) -> Tensor:
+        return self.image(sample.light)(sample.phase)
+
     def state_dict(self) -> dict[str, Any]:
         return {"weight": self.weight, "moment": self.moment, "unit": self.unit}
 

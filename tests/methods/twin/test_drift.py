@@ -11,7 +11,7 @@ from holobench_eval.methods.calibrated.approximator import PredictedCapture, Rat
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.twin.drift import TwinApproximator, taken
-from holobench_eval.methods.twin.model import TwinCamera, TwinModel
+from holobench_eval.methods.twin.model import TwinCamera, TwinModel, picked
 from tests.support.small_training import small_spec
 
 SPEC = small_spec(size=64, region=48)
@@ -38,7 +38,7 @@ def photographs(drift: tuple[float, float], power: float) -> list[Sample]:
 def fitted(samples: list[Sample], exposed: bool = True) -> TwinApproximator:
     approximator = TwinApproximator(SPEC, Rates(model=3e-3, terms=5e-2))
     if exposed:
-        approximator.expose(samples)
+        approximator.steadied([samples[number] for number in (0, COUNT // 2, COUNT - 1)])
     for step in range(8 * COUNT):
         approximator.step(samples[step % COUNT], step / (8 * COUNT))
     return approximator
@@ -76,3 +76,19 @@ def test_captures_of_a_steady_display_have_their_full_brightness() -> None:
     approximator = fitted(photographs((0.0, 0.0), 0.0))
     assert float(approximator.terms.power) < 1e-6
     assert approximator.terms.drift.abs().max() < 0.1
+
+
+def test_captures_that_are_held_out_are_predicted_where_the_picture_was() -> None:
+    samples, approximator = photographs(DRIFT, 0.0), TwinApproximator(SPEC, Rates(model=1e-3))
+    with torch.no_grad():
+        approximator.terms.drift.copy_(torch.tensor(DRIFT))
+        for sample in samples[-4:]:
+            assert torch.allclose(approximator.predicted(sample), sample.capture, atol=1e-5)
+
+
+def test_pixels_are_picked_as_torch_samples_them() -> None:
+    draw = torch.Generator().manual_seed(2)
+    image, at = torch.rand(2, 9, 12, generator=draw), 16 * torch.rand(2, 5, 6, generator=draw) - 2
+    grid = torch.stack([2 * at[1] / 11 - 1, 2 * at[0] / 8 - 1], -1).expand(2, -1, -1, -1)
+    wanted = torch.nn.functional.grid_sample(image[:, None], grid, "bilinear", "border", align_corners=True)[:, 0]
+    assert torch.allclose(picked(image, at), wanted, atol=1e-5)

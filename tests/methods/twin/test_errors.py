@@ -49,6 +49,13 @@ def test_an_error_is_that_of_the_halves_and_not_below_misfit(apart: float) -> No
     assert found["coma_x"] == pytest.approx(MISFIT * QUANTITIES["coma_x"].error)
 
 
+@pytest.mark.parametrize("hidden", [(), ("stray_share",)])
+def test_light_is_known_no_better_than_what_haze_takes_of_it(hidden: tuple[str, ...]) -> None:
+    (light, *_) = (item for item in estimates(learned(spec(), hidden=hidden), spec()) if item.name == "light")
+    haze = QUANTITIES["stray_share"].error * (1.0 if hidden else MISFIT)
+    assert light.error == pytest.approx(MISFIT * QUANTITIES["light"].error + light.value * haze)
+
+
 def test_what_is_not_seen_is_told_without_an_error() -> None:
     rows = joined(estimates(learned(spec(), hidden=("coma_y",)), spec()), [])
     hidden = [row for row in rows if row.get("seen") is False]
