@@ -23,7 +23,7 @@ CONSTANTS: dict[type[Any], tuple[str, ...]] = {
 """Constant fields of a handle, sent at the start."""
 REQUESTS: dict[type[Any], tuple[str, ...]] = {
     MeteredDisplay: ("capture", "announce", "keep", "rectify", "captures", "kept", "over", "generator"),
-    TrainingBench: ("photograph", "announce", "captures", "seconds", "load", "save", "log", "generator"),
+    TrainingBench: ("photograph", "announce", "captures", "number", "seconds", "load", "save", "log", "generator"),
 }
 """Members of a handle that a method may ask for. One with the same arguments on both sides needs only its name here."""
 
