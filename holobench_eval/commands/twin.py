@@ -77,6 +77,7 @@ def _photographs(
     from ..lab.session.manifest import FILE as MANIFEST
     from ..study.calibration import twin as twins
     from ..study.calibration.twin import PHOTOGRAPHS, WORK
+    from ..study.network_display import predictor
 
     name = output.resolve().name
     if Path(display).is_dir():
@@ -95,6 +96,8 @@ def _photographs(
     if panel and twins.is_bench(Path(display)):
         raise UserError(f"{display}: a bench has the panel that its file says; leave out --panel")
     twins.refuse_fourier(display)
+    if network:
+        predictor(network, {})
     text = twins.study_text(display, panel or PANEL_SIZE, pictures or PICTURES, network)
     config = output / WORK / f"{PHOTOGRAPHS}.yaml"
     is_new = not config.exists()

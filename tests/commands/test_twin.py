@@ -82,6 +82,9 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["mine.yaml", "-o", "."], "mine.yaml: is no twin of 'mine'; choose another --output"),
         (["eye.yaml", "-o", "lab"], "'eye': a display that is seen through a known lens has no twin"),
         (["bench.yaml", "-o", "lab", "--panel", "128", "128"], "bench.yaml: a bench has the panel that its file says"),
+        (["ideal", "-o", "lab", "--network", "sgd"], "'sgd' cannot be a display; expected a method of this package"),
+        (["ideal", "-o", "lab", "--network", "own.py:Own"], "'own.py:Own' cannot be a display; expected a method of t"),
+        (["ideal", "-o", "lab", "--network", "nothing"], "'nothing' cannot be a display; expected a method of this"),
     ],
 )
 def test_what_cannot_be_is_one_line(
