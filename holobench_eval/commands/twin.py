@@ -38,8 +38,8 @@ def twin(
 ) -> None:
     """Learn the twin of a display from photographs: a profile with maps, tried on pictures that it has not seen.
 
-    It takes about 60 photographs to learn from, and ten of each picture to be tried on. A stopped one goes on with the
-    same command.
+    It takes 45 to 57 photographs to learn from, as many as help, and ten of each picture to be tried on. A stopped one
+    goes on with the same command.
     """
     from ..core.io import file_name
     from ..report.data.twin import tried

@@ -15,7 +15,7 @@ from ..study.calibration.twin import Photographed
 from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .data.statistics import Estimate
-from .data.twin import Pair, Trial
+from .data.twin import Trial
 from .markdown import Markdown, blocks, bullets, code, heading, table
 from .sections.diagnosis import quantities
 
@@ -30,7 +30,7 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
     path, less = folder / "report.md", len(found.twins) > 1
     text = blocks(
         [
-            heading(f"{found.name}: the twin of {found.of}", 1),
+            heading(f"{found.name}: {'the twin of' if less else 'a network in the place of'} {found.of}", 1),
             bullets(answer(found)),
             Markdown("![A picture on the display and on its twin]({})").format(Markdown(PICTURES)),
             "The first picture, matched to its target; differences in linear light, without their sign.",
@@ -64,16 +64,17 @@ def answer(found: Trial) -> Iterable[str]:
     sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
     if flattery.mean > MOST:
         sentence += f" That is more than {MOST:g} dB: it does not tell which method that learns is better."
+        sentence += f" {len(found.pictures)} pictures do not tell it from less; try more." * (flattery.low < MOST)
     yield sentence
-    pair = found.worst(learned=True)
+    plain, learned = found.worst(), found.worst(learned=True)
     yield (
-        "Differences of two methods, of which one went through the twin: off by up to "
-        f"{pair.apart:.1f} dB ({_pair(pair)})."
+        f"Differences of two methods are off by up to {plain.apart:.1f} dB where neither learns, and by up to "
+        f"{learned.apart:.1f} dB where one has learned the display."
     )
-
-
-def _pair(pair: Pair) -> str:
-    return f"{pair.first} less {pair.second}: {pair.twin.mean:+.1f} dB for {pair.display.mean:+.1f}"
+    if len(found.twins) == 1:
+        yield "A network has no noise, and the display has: that is a part of its flattery and of its distance."
+    if found.is_simulated:
+        yield "The display is simulated, by equations that are in part the twin's: expect larger errors on a bench."
 
 
 def _signed(estimate: Estimate) -> str:
@@ -134,7 +135,8 @@ def _parameters(photographed: Photographed, in_halves: bool) -> Iterable[Markdow
     hidden = [QUANTITIES[row["name"]].words for row in rows if row.get("seen") is False]
     yield (
         "Stated errors are meant to hold with 90 %: how far fits to halves of the photographs, of different holograms, "
-        "move apart. In brackets the truth, where the display is simulated."
+        "move apart, and no less than what was left on simulated displays. In brackets the truth, where the display is "
+        "simulated."
     )
     if hidden:
         yield f"No photograph shows: {', '.join(dict.fromkeys(hidden))}."

@@ -52,7 +52,8 @@ class Trial:
     """A twin that was tried.
 
     label: of the method whose holograms were made through it; pictures: by name; display: scores on the display
-    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin.
+    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. is_simulated:
+    whether the display is.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Trial:
     pictures: tuple[str, ...]
     display: Mapping[str, NDArray[np.float64]]
     twins: Mapping[str, Mapping[str, Shown]]
+    is_simulated: bool = True
 
     @property
     def twin(self) -> Mapping[str, Shown]:
@@ -131,7 +133,8 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
             scores = np.array([score for _, score in others.values()])
             shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
     learned = photographed.learned.provenance["captures"]
-    return Trial(name, photographed.display.name, photographed.label, learned, pictures, display, twins)
+    of, is_simulated = photographed.display.name, photographed.display.real is None
+    return Trial(name, of, photographed.label, learned, pictures, display, twins, is_simulated)
 
 
 def same(photographed: Photographed, label: str, item: str) -> list[Cell]:

@@ -255,7 +255,8 @@ def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
     config, names = folder / WORK / f"{TRIAL}.yaml", trial_names(name, photographed)
     write_atomically(config, _trial_text(photographed, names).encode())
     if row.name != "twin":
-        state = photographed.learned.state
+        state, of = photographed.learned.state, photographed.display.name
+        base = replace(base, description=f"What {row.name} has learned of {of} from photographs; without noise.")
         return load_profile(str(write_network(state, row.name, row.params, base, trial)))
     model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
     untried = load_profile(str(to_profile(model, camera, base, trial)))
