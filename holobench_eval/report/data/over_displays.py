@@ -42,8 +42,10 @@ def is_many(results: Results) -> bool:
 
 
 def applies(results: Results) -> bool:
-    """Whether a study compares methods with a baseline over many displays."""
-    return is_many(results) and not results.layout.predicts and results.layout.baseline is not None
+    """Whether a study compares methods, and not only oracles, with a baseline over many displays."""
+    layout = results.layout
+    compared = {*layout.methods} - {*layout.privileged, layout.baseline}
+    return is_many(results) and not layout.predicts and layout.baseline is not None and bool(compared)
 
 
 def shown_on(results: Results) -> list[str]:

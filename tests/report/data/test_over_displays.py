@@ -48,6 +48,12 @@ def test_few_displays_are_answered_each_by_itself():
     assert kind_of(results) is not over_displays.KIND
 
 
+def test_oracles_alone_are_no_comparison_over_displays():
+    means = {f"{label}@{name}": 17.0 for name in DISPLAYS for label in ("old", "new")}
+    assert kind_of(results_of(means, privileged=frozenset({"new"}))) is not over_displays.KIND
+    assert kind_of(results_of(means)) is over_displays.KIND
+
+
 def test_a_display_that_lacks_a_score_is_left_out_and_named():
     results = study()
     lost = (results.frame["condition"] == DISPLAYS[3]) & (results.frame["target"] == "t2")
