@@ -17,7 +17,7 @@ from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.methods.calibrated.approximator import PredictedCapture
 from holobench_eval.methods.calibrated.patterns import random_phase
 from holobench_eval.methods.learned.samples import Sample
-from holobench_eval.methods.twin.errors import MISFIT, NUDGES, QUANTILE, estimates, unseen
+from holobench_eval.methods.twin.errors import LEFT, MISFIT, NUDGES, QUANTILE, estimates, unseen
 from holobench_eval.methods.twin.model import TwinCamera, TwinModel
 from holobench_eval.methods.twin.to_profile import to_profile
 
@@ -45,15 +45,8 @@ def learned(spec: DisplaySpec, apart: float = 0.0, hidden: tuple[str, ...] = ())
 def test_an_error_is_that_of_the_halves_and_not_below_misfit(apart: float) -> None:
     found = {item.name: item.error for item in estimates(learned(spec(), apart), spec()) if item.colour == 1}
     usual = QUANTITIES["crosstalk"].error
-    assert found["crosstalk"] == pytest.approx(max(QUANTILE * apart / 2, MISFIT * usual), rel=1e-3)
+    assert found["crosstalk"] == pytest.approx(max(QUANTILE * apart / 2, LEFT["crosstalk"] * usual), rel=1e-3)
     assert found["coma_x"] == pytest.approx(MISFIT * QUANTITIES["coma_x"].error)
-
-
-@pytest.mark.parametrize("hidden", [(), ("stray_share",)])
-def test_light_is_known_no_better_than_what_haze_takes_of_it(hidden: tuple[str, ...]) -> None:
-    (light, *_) = (item for item in estimates(learned(spec(), hidden=hidden), spec()) if item.name == "light")
-    haze = QUANTITIES["stray_share"].error * (1.0 if hidden else MISFIT)
-    assert light.error == pytest.approx(MISFIT * QUANTITIES["light"].error + light.value * haze)
 
 
 def test_what_is_not_seen_is_told_without_an_error() -> None:
