@@ -30,7 +30,7 @@ def network_bench(profile: Profile, seed: int, device: torch.device) -> LearnedB
 
     UserError: its file is not as it says, or of other code of the method, or the method is not of this package.
     """
-    given, path = profile.network, Path(profile.network.file)
+    given, path = profile.network, Path(profile.network.file or "")
     method = predictor(given.method or "", given.params)
     if (version := method_version(type(method))) != given.version:
         told = f"was learned with the code '{given.version}' of {given.method}, and here is '{version}'"

@@ -19,11 +19,12 @@ from ..core.errors import CellError, Pending, StopError, reason
 from ..core.installed import __version__
 from ..core.io import now, write_atomically
 from ..core.reads import Seen, recorded
-from ..display.calibrated import CalibratedBench
 from ..display.estimates import joined
+from ..display.learned import LearnedBench
 from ..display.simulated.ground_truth import truth
 from ..display.training import TrainingBench, TrainingImage
 from ..display.traits import traits_of
+from ..lab.real import RealBench
 from . import isolation, opening
 from .artifacts import LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
@@ -36,6 +37,7 @@ from .scoring.job import Setting
 from .scoring.reference import guarded
 from .versions import AGAIN, HARNESS, dataset_version, gate, method_version
 
+UNKNOWN = RealBench, LearnedBench  # displays without a ground truth
 WAITS = "waits for photographs"  # in place of the reason of a failure
 
 
@@ -133,9 +135,9 @@ def diagnosis(method: Any, state: Mapping[str, Any], display_bench: opening.Benc
     findings: dict[str, Any] = {}
     try:
         if "estimates" in traits.functions:
-            true_values = truth(display_bench.bench) if isinstance(display_bench, CalibratedBench) else ()
+            true_values = () if isinstance(display_bench, UNKNOWN) else truth(display_bench.bench)
             findings["estimates"] = joined(method.estimates(state, display_bench.spec), true_values)
-        if traits.form is not None and isinstance(display_bench, CalibratedBench):
+        if traits.form is not None and not isinstance(display_bench, UNKNOWN):
             findings["missing"] = [
                 effect.text for effect in display_bench.bench.profile.effects() if effect.name not in traits.form
             ]

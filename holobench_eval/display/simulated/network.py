@@ -27,15 +27,15 @@ class NetworkFile:
     """
 
     method: str | None = None
-    version: str = ""
+    version: str | None = None
     params: Mapping[str, Any] = field(default_factory=dict)
-    file: str = ""
+    file: str | None = None
     size: Annotated[int, Interval(ge=0, le=LARGEST)] = 0
-    sha256: str = ""
+    sha256: str | None = None
 
     def found(self, folder: Path) -> Path:
         """The file's path; folder: of the profile. UserError: it is elsewhere, or another than the profile says."""
-        path = inside(self.file, folder)
+        path = inside(self.file or "", folder)
         self.content(path)
         return path
 
