@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
-import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +12,11 @@ import torch
 from ..core import plugins
 from ..core.device import moved
 from ..core.errors import UserError, reason
-from ..core.io import file_name, write_atomically
+from ..core.io import file_name
 from ..display import Profile
 from ..display.learned import LearnedBench
 from ..display.simulated.network import LARGEST
+from ..methods.twin.to_profile import write_learned
 from .artifacts import read_tensors
 from .versions import method_version
 
@@ -55,36 +53,16 @@ def write_network(
 ) -> Path:
     """Write a profile of what a method has learned; the file's path.
 
-    base: its name, version, nominal panel, and what is known of it. UserError: a method that is not installed, or a
-    file of more than 100 MB.
+    base: its name, version, nominal panel, and what is known of it. UserError: a method that is not of this
+    package, or a file of more than 100 MB.
     """
     version, stem, buffer = method_version(type(predictor(method, params))), file_name(base.name), io.BytesIO()
     torch.save({"state": dict(state)}, buffer)
     content = buffer.getvalue()
     if len(content) > LARGEST:
         raise UserError(f"{method} has learned {len(content) / 1e6:.0f} MB; a display has at most {LARGEST / 1e6:g} MB")
-    sha256 = hashlib.sha256(content).hexdigest()
-    document = {
-        "name": base.name,
-        "version": base.version,
-        "seed": 0,
-        "description": base.description,
-        "panel": {key: value for key, value in asdict(base.panel).items() if key != "maps"},
-        "residual_bound": base.residual_bound,
-        "network": {
-            "method": method,
-            "version": version,
-            "params": dict(params),
-            "file": f"{stem}.pt",
-            "size": len(content),
-            "sha256": sha256,
-        },
-        **({"twin": asdict(base.twin)} if base.twin.of else {}),
-    }
-    write_atomically(folder / f"{stem}.pt", content)
-    lines = "".join(f"{key}: {json.dumps(value)}\n" for key, value in document.items())
-    write_atomically(folder / f"{stem}.yaml", lines.encode())
-    return folder / f"{stem}.yaml"
+    facts = {"method": method, "version": version, "params": dict(params)}
+    return write_learned(base, {}, "network", facts, f"{stem}.pt", content, folder)
 
 
 def predictor(name: str, params: Mapping[str, Any]) -> Any:

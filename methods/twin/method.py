@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, cast
 
 import torch
 from annotated_types import Interval
@@ -124,8 +124,8 @@ class Twin(ThroughModel):
 
     def _samples(self, approximator: ModelApproximator, bench: TrainingBench) -> Sequence[Sample]:
         samples, first = super()._samples(approximator, bench), 0 if self.patterns else 1
-        if isinstance(approximator, TwinApproximator):
-            approximator.steadied([pattern_samples(bench, 1, number)[0] for number in range(first, 3)])
+        again = [pattern_samples(bench, 1, number)[0] for number in range(first, 3)]
+        cast(TwinApproximator, approximator).steadied(again)
         return samples
 
     def _earlier(self, bench: TrainingBench) -> Sequence[Sample]:

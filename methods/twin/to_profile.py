@@ -81,24 +81,43 @@ def write_profile(held: Mapping[str, Tensor], base: Profile, folder: Path) -> Pa
             f"'{base.name}': maps of {len(packed) / 1e6:.0f} MB; at most {LARGEST / 1e6:g} MB, as of a smaller panel"
         )
     sensor = {key: getattr(base.sensor, key) for key in ("bits", "dark", "full_well", "read_noise", "headroom")}
+    entries = {
+        "sampling": SAMPLES,
+        "aperture": {"fill": 1.0},
+        "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **sensor},
+        **({"lut": {"table": base.panel.levels}} if base.panel.levels and "lut.table" not in held else {}),
+    }
+    return write_learned(base, entries, "maps", {}, f"{stem}.npz", packed, folder)
+
+
+def write_learned(
+    base: Profile,
+    entries: Mapping[str, Any],
+    key: str,
+    facts: Mapping[str, Any],
+    file: str,
+    content: bytes,
+    folder: Path,
+) -> Path:
+    """Write a profile of the nominal panel of ``base``, and the file beside it that ``key`` names; the profile's path.
+
+    entries: further ones of the profile; facts: what ``key`` says besides the file's name, size and SHA-256.
+    """
     document = {
         "name": base.name,
         "version": base.version,
         "seed": 0,
         "description": base.description,
-        "panel": {key: value for key, value in asdict(base.panel).items() if key != "maps"},
-        "sampling": SAMPLES,
-        "aperture": {"fill": 1.0},
-        "sensor": {"pitch": max(FINEST, base.panel.pitch / 2), **sensor},
+        "panel": {name: value for name, value in asdict(base.panel).items() if name != "maps"},
         "residual_bound": base.residual_bound,
-        "maps": {"file": f"{stem}.npz", "size": len(packed), "sha256": hashlib.sha256(packed).hexdigest()},
-        **({"lut": {"table": base.panel.levels}} if base.panel.levels and "lut.table" not in held else {}),
+        **entries,
+        key: {**facts, "file": file, "size": len(content), "sha256": hashlib.sha256(content).hexdigest()},
         **({"twin": asdict(base.twin)} if base.twin.of else {}),
     }
-    lines = "".join(f"{key}: {json.dumps(value)}\n" for key, value in document.items())
-    write_atomically(folder / f"{stem}.npz", packed)
-    write_atomically(folder / f"{stem}.yaml", lines.encode())
-    return folder / f"{stem}.yaml"
+    write_atomically(folder / file, content)
+    path = folder / f"{file_name(base.name)}.yaml"
+    write_atomically(path, "".join(f"{name}: {json.dumps(value)}\n" for name, value in document.items()).encode())
+    return path
 
 
 def panel_maps(model: TwinModel) -> dict[str, Tensor]:
