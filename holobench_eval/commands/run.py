@@ -61,7 +61,7 @@ def run(
     With --methods, --targets, --limit or --set, a part or a variant of the study is run, and its report says so.
     """
     changes = options.changes_of(methods, targets, limit, values)
-    with _resumable():
+    with resumable():
         if changes or retrain or retry_failed or not _is_finished(config, output):
             from ..study.executors import begin
 
@@ -131,7 +131,8 @@ def replaced(study: Study, folder: Path) -> str:
 
 
 @contextmanager
-def _resumable() -> Iterator[None]:
+def resumable() -> Iterator[None]:
+    """Say of an interrupted computation how it goes on."""
     try:
         yield
     except KeyboardInterrupt:

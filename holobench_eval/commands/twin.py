@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import UserError
-from .options import ARTIFACTS, PANEL, RETRAIN, Learned
+from .options import ARTIFACTS, PANEL, RETRAIN, Learned, thread_count
+from .output import console
+from .run import resumable, run
 
 if TYPE_CHECKING:
     from ..study.calibration.twin import Photographed
@@ -45,7 +47,6 @@ def twin(
     from ..report.data.twin import tried
     from ..report.twin import answer, write_twin
     from ..study.calibration import twin as twins
-    from ..study.calibration.twin import TRIAL
 
     name = output.resolve().name
     if file_name(name) != name:
@@ -53,8 +54,8 @@ def twin(
     source = _photographs(display, output, panel, pictures, network, artifacts, retrain)
     print(f"{output}: photographs are there; the twin is tried on the same holograms")
     profile = twins.write_trial(source, name, output)
-    _run(output, TRIAL, artifacts, retrain=False)
-    trial = twins.in_folder(output, artifacts, TRIAL)
+    _show_on_twin(output, artifacts)
+    trial = twins.in_folder(output, artifacts, twins.TRIAL)
     found = tried(source, trial, name)
     path = twins.publish(replace(profile, twin=found.trust()), source, output)
     report = write_twin(output, source, trial, found, path)
@@ -113,13 +114,20 @@ def _photographs(
                 output.joinpath(WORK).rmdir()
                 output.rmdir()
         raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
-    _run(output, PHOTOGRAPHS, artifacts, retrain)
+    run(config, output=output / WORK / PHOTOGRAPHS, artifacts=artifacts, retrain=retrain)
     return twins.in_folder(output, artifacts)
 
 
-def _run(folder: Path, study: str, artifacts: Path, retrain: bool) -> None:
-    from ..study.calibration.twin import WORK
-    from .run import run
+def _show_on_twin(output: Path, artifacts: Path) -> None:
+    """Capture the holograms on the twin and those it has to be better than. The report of the twin has what counts."""
+    from ..study.calibration.twin import TRIAL, WORK
+    from ..study.config import load_study
+    from ..study.executors import Serial
+    from ..study.plan import plan
+    from ..study.progress import watching
+    from ..study.run import run as compute
 
-    work = folder / WORK
-    run(work / f"{study}.yaml", output=work / study, artifacts=artifacts, retrain=retrain)
+    work = output / WORK
+    study = load_study(work / f"{TRIAL}.yaml")
+    with resumable(), watching(console()) as watch:
+        compute(study, plan(study), work / TRIAL, Serial(), watch, thread_count(None, 1, study), artifacts)

@@ -57,9 +57,10 @@ def answer(found: Trial) -> Iterable[str]:
     """What a lab has to know before it uses the twin."""
     gaps = {label: float(shown.gaps[:, 0].mean()) for label, shown in found.twin.items()}
     flattery = found.difference(found.label)
+    (least, nearest), *_, (most, furthest) = sorted((gap, label) for label, gap in gaps.items())
     yield (
-        f"A capture of the twin is further from a photograph than a second photograph is by {min(gaps.values()):.1f} "
-        f"to {max(gaps.values()):.1f} dB, by method."
+        f"A capture of the twin is further from a photograph than a second photograph is by {least:.1f} dB ({nearest}) "
+        f"to {most:.1f} dB ({furthest})."
     )
     sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
     if flattery.mean > MOST:
@@ -68,8 +69,8 @@ def answer(found: Trial) -> Iterable[str]:
     yield sentence
     plain, learned = found.worst(), found.worst(learned=True)
     yield (
-        f"Differences of two methods are off by up to {plain.apart:.1f} dB where neither learns, and by up to "
-        f"{learned.apart:.1f} dB where one has learned the display."
+        f"A difference of two methods below {plain.apart:.1f} dB tells nothing of the display, nor one below "
+        f"{learned.apart:.1f} dB where a method has learned the display: the twin is off by as much."
     )
     if len(found.twins) == 1:
         yield "A network has no noise, and the display has: that is a part of its flattery and of its distance."

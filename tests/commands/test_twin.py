@@ -61,7 +61,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert "Flattery: holograms made through the twin" in printed
     assert "| lab-turned |" in report
     assert "| twin (flattery) |" in report
-    assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "work/trial/report.md"))
+    assert all((Path("lab") / name).is_file() for name in ("pictures.jpg", "scores.png", "work/photographs/report.md"))
     assert basis(profile).startswith(f"simulated, a twin of green, trained with {photographs} photographs: its captur")
     Path("lab/lab.npz").unlink()
     source = twins.in_folder(Path("lab"), Path("artifacts"))
