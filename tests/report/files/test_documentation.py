@@ -20,11 +20,11 @@ EXAMPLES = re.findall(
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The files of Table 3, written from its committed records, in the working folder."""
-    report = tmp_path / "reports" / "table3"
+    """The files of the leaderboard, written from its committed records, in the working folder."""
+    report = tmp_path / "reports" / "leaderboard"
     report.mkdir(parents=True)
-    records = read_records((ROOT / "reports" / "table3" / "records.csv").read_text())
-    write_files(Results(records, layout_of(load_study(ROOT / "configs" / "table3.yaml"))), report)
+    records = read_records((ROOT / "reports" / "leaderboard" / "records.csv").read_text())
+    write_files(Results(records, layout_of(load_study(ROOT / "configs" / "leaderboard.yaml"))), report)
     monkeypatch.chdir(tmp_path)
     return report
 
