@@ -19,14 +19,13 @@ from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
 from ...optics.phasor import squared_modulus
-from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fourier_path import FourierPath
-from .fused_path import quickest
+from .fused_path import FusedPath, quickest
 from .geometry import Geometry
 from .noise import normal
 from .panel_light import PanelLight
-from .path import Dust, LightPath, OpticalPath, image
+from .path import LightPath, OpticalPath
 from .profile import Profile
 from .stages.propagation import sample_weights
 from .stages.relay import finer_grid, sample, sampling_grid
@@ -169,9 +168,9 @@ class SimulatedBench:
                 shape=geometry.shape,
                 rows=rows,
                 columns=columns,
-                transfer=by_columns(legs[0]),
-                dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
-                last=None if plane is None else by_columns(legs[1]),
+                transfer=legs[0],
+                dust=None if plane is None else plane - 1,
+                last=None if plane is None else legs[1],
                 finer=self.image_samples,
             ),
             self.device,
@@ -204,9 +203,9 @@ class SimulatedBench:
         gain = flicker * self.drift_gain
 
         def of_line(maps: ChannelMaps, gain: float) -> Tensor:
-            if maps.light.ready(phase):
+            if isinstance(maps.path, FusedPath) and maps.light.ready(phase):
                 return maps.path.intensity(maps.light.rows(phase, gain))
-            return squared_modulus(image(maps.path, maps.light.field(phase, gain)))
+            return squared_modulus(maps.path.forward(maps.light.field(phase, gain)))
 
         moments = self.profile.flicker.moments
         light = reduce(add, (of_line(maps, gain * moment) for maps in self.lines[channel] for moment in moments))
