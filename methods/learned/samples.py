@@ -124,11 +124,7 @@ class Approximator(Protocol):
 
 
 def captured(
-    bench: TrainingBench,
-    keys: Sequence[str],
-    phases: Sequence[Tensor],
-    images: Sequence[TrainingImage],
-    *names: object,
+    bench: TrainingBench, keys: Sequence[str], phases: Sequence[Tensor], images: Sequence[TrainingImage], *names: object
 ) -> Iterator[Sample]:
     """Captures of phases, announced together and each kept under its key; ``names`` decide on their noise."""
     bench.announce((phase, image, names) for phase, image in zip(phases, images, strict=True))
