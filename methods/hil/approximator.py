@@ -11,7 +11,7 @@ from torch import Tensor
 from ...display.api import DisplaySpec
 from ..common import matched, unit_field
 from ..learned.retrieval import Image, Verdict
-from ..learned.samples import Sample
+from ..learned.samples import Approximator, Sample
 from ..learned.weights import refuse_other_weights
 from .approximator_loss import PUBLISHED_RATES, ApproximatorLoss, LearningRates
 from .critic import Critic
@@ -19,7 +19,7 @@ from .networks import Network
 from .trainer import trainer
 
 
-class NetworkApproximator:
+class NetworkApproximator(Approximator):
     """D: ideal intensity to captured intensity, both in the region, all colours at once (Eq. 18-19).
 
     Parameters
@@ -119,10 +119,6 @@ class NetworkApproximator:
             return (predicted.square() if self.of_amplitude else predicted) / self.gain.view(-1, 1, 1)
 
         return display
-
-    def predicted(self, sample: Sample) -> Tensor:
-        """What is expected of the capture of a sample, ``(C, h, w)``."""
-        return self.image(sample.light)(sample.phase)
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""

@@ -109,6 +109,7 @@ class Approximator(Protocol):
 
     def predicted(self, sample: Sample) -> Tensor:
         """What it expects of the capture of a sample, ``(C, h, w)``."""
+        return self.image(sample.light)(sample.phase)
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
