@@ -64,8 +64,8 @@ class OpticalPath:
 
     def changed(self, change: Map) -> OpticalPath:
         """The same with a change of every tensor of its own."""
-        own = {name: value for name, value in vars(self).items() if isinstance(value, Tensor)}
-        return replace(self, **{name: change(value) for name, value in own.items()})
+        own: dict[str, Any] = {name: change(value) for name, value in vars(self).items() if isinstance(value, Tensor)}
+        return replace(self, **own)
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
