@@ -16,7 +16,7 @@ from ..learned.weights import refuse_other_weights
 from .approximator_loss import PUBLISHED_RATES, ApproximatorLoss, LearningRates
 from .critic import Critic
 from .networks import Network
-from .trainer import trainer
+from .trainer import Trainer
 
 
 class NetworkApproximator(Approximator):
@@ -59,7 +59,7 @@ class NetworkApproximator(Approximator):
     ) -> None:
         channels = len(spec.wavelengths)
         self.spec = spec
-        self.trainer = trainer(network, loss, channels, channels, seed, rates)
+        self.trainer = Trainer(network, loss, channels, seed, rates)
         self.gain = self.ideal_gain = torch.ones(channels)
         self.of_amplitude = of_amplitude
         self.critic = Critic(channels, network, seed) if with_critic else None
