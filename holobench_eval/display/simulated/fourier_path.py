@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from ...optics.fourier import fourier_matrix
+from ...optics.linear import linear
 from .geometry import Geometry
-from .path import linear
 from .stages.crosstalk import sample_positions
 from .stages.propagation import Propagation
 

@@ -12,8 +12,9 @@ from torch import Tensor
 
 from ...optics.blocks import in_blocks
 from ...optics.kernel.sizes import LANES, steps
+from ...optics.linear import linear
 from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
-from .path import Light, LightPath, OpticalPath, linear
+from .path import Light, LightPath, OpticalPath
 
 
 def quickest(path: OpticalPath, device: torch.device) -> LightPath:

@@ -10,7 +10,8 @@ from typing import Any, Protocol
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
+
+from ...optics.linear import Map
 
 
 class LightPath(Protocol):
@@ -22,25 +23,6 @@ class LightPath(Protocol):
 
 Light = Callable[[slice], Tensor]
 """Some rows of the sub-samples' light: ``(samples, samples, rows, W)``, contiguous. Starts are multiples of sixteen."""
-Map = Callable[[Tensor], Tensor]
-
-
-def linear(forward: Map, adjoint: Map, field: Tensor) -> Tensor:
-    """``forward`` of a field, whose gradient is by ``adjoint``."""
-    seen: Tensor = _Linear.apply(field, forward, adjoint)  # type: ignore[no-untyped-call]
-    return seen
-
-
-class _Linear(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, field: Tensor, forward: Map, adjoint: Map) -> Tensor:
-        ctx.adjoint = adjoint
-        return forward(field)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
-        return ctx.adjoint(grad), None, None
 
 
 @dataclass(frozen=True, eq=False)
