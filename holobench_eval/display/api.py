@@ -194,24 +194,15 @@ def _free_space(
     spec: DisplaySpec, channel: int, dtype: torch.dtype, device: torch.device, offset: float
 ) -> AngularSpectrum:
     wavelength = spec.wavelengths[channel] + offset
-    model = AngularSpectrum(
-        shape=spec.shape,
-        pitch=spec.pitch,
-        wavelength=wavelength,
-        distance=spec.distance,
-        pupil=spec.pupil,
-        dtype=dtype,
-        device=device,
-    )
+    model = AngularSpectrum(spec.shape, spec.pitch, wavelength, spec.distance, spec.pupil, dtype=dtype, device=device)
+    (fy, fx), added = frequencies(model.padded_shape, spec.pitch, device), []
     if any(spec.eye):
-        fy, fx = frequencies(model.padded_shape, spec.pitch, device)
-        eye = refocus(spec.eye, fy, fx, wavelength, spec.distance)
-        model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(eye), eye).to(dtype))
+        added.append(refocus(spec.eye, fy, fx, wavelength, spec.distance))
     if offset and any(spec.blaze):
-        fy, fx = frequencies(model.padded_shape, spec.pitch, device)
         y, x = (spec.distance * offset * cycles / spec.pitch for cycles in spec.blaze)
-        moved = -TAU * (fy * y + fx * x)
-        model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(moved), moved).to(dtype))
+        added.append(-TAU * (fy * y + fx * x))
+    for phase in added:
+        model.transfer = transfer_function(model.transfer.values * torch.polar(torch.ones_like(phase), phase).to(dtype))
     return model
 
 

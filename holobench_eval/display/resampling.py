@@ -3,14 +3,18 @@ to its noise."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
 CUBIC = -0.75  # the constant of ``cv2.INTER_CUBIC`` and of torch's bicubic sampling
+Weighted = Sequence[tuple[Tensor, Tensor]]
+"""Places along an axis, and their weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +45,23 @@ class Resampling:
         return _weights(self.y).square().sum(0) * _weights(self.x).square().sum(0)
 
     def _gathered(self, frame: Tensor) -> Tensor:
-        """The same from pixels picked by index: its gradient is deterministic on a GPU, that of torch is not."""
-        rows, columns = frame.shape
-        left, top = self.x.floor() - 1, self.y.floor() - 1
-        total = torch.zeros_like(self.x)
-        for i, row_weight in enumerate(_weights(self.y)):
-            for j, column_weight in enumerate(_weights(self.x)):
-                row, column = top + i, left + j
-                inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
-                pixels = frame[row.clamp(0, rows - 1).long(), column.clamp(0, columns - 1).long()]
-                total = total + row_weight * column_weight * inside * pixels
-        return total
+        rows, columns = ([(at.floor() - 1 + i, w) for i, w in enumerate(_weights(at))] for at in (self.y, self.x))
+        return picked(frame, rows, columns)
+
+
+def picked(image: Tensor, rows: Weighted, columns: Weighted) -> Tensor:
+    """Weighted sums of pixels of an image ``(H, W)``, zero outside of it, each of some rows and of some columns.
+
+    Pixels are picked by index: the gradient is deterministic on a GPU, where that of torch's sampling is not.
+    """
+    height, width = image.shape
+    total = torch.zeros_like(rows[0][0])
+    for (row, down), (column, along) in product(rows, columns):
+        inside = (row >= 0) & (row <= height - 1) & (column >= 0) & (column <= width - 1)
+        total = (
+            total + down * along * inside * image[row.clamp(0, height - 1).long(), column.clamp(0, width - 1).long()]
+        )
+    return total
 
 
 def _weights(at: Tensor) -> Tensor:

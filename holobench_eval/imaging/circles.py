@@ -45,10 +45,7 @@ def _find_at(frame: Frame, grid: FiducialGrid, scale: float) -> Iterator[Array]:
             continue
         for method in (0, cv2.CALIB_CB_CLUSTERING):
             complete, points = cv2.findCirclesGrid(
-                picture,
-                (grid.columns, grid.rows),
-                flags=cv2.CALIB_CB_SYMMETRIC_GRID | method,
-                blobDetector=detector,
+                picture, (grid.columns, grid.rows), flags=cv2.CALIB_CB_SYMMETRIC_GRID | method, blobDetector=detector
             )
             if complete:
                 yield (np.asarray(points, dtype=np.float64).reshape(-1, 2) + 0.5) * shrink - 0.5

@@ -7,12 +7,12 @@ what autograd takes for the same sum of slices.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 from torch.nn import functional
+
+from ..optics.linear import linear
 
 
 def mirrored(image: Tensor, margin: int) -> Tensor:
@@ -36,16 +36,11 @@ def correlate(image: Tensor, taps: Sequence[float], dim: int) -> Tensor:
 
 def correlate_each(image: Tensor, filters: Sequence[Sequence[float]], dim: int) -> Tensor:
     """``correlate`` with each of N filters of one length: ``(..., H, W)`` to ``(..., N, H', W')``."""
-    result: Tensor = _Correlation.apply(image, filters, dim)  # type: ignore[no-untyped-call]
-    return result
+    shape, count = image.shape, len(filters[0])
+    size = shape[dim] - count + 1
 
-
-class _Correlation(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, image: Tensor, filters: Sequence[Sequence[float]], dim: int) -> Tensor:
-        ctx.shape, ctx.filters, ctx.dim = image.shape, filters, dim
-        size = image.shape[dim] - len(filters[0]) + 1
-        slices = [image.narrow(dim, shift, size) for shift in range(len(filters[0]))]
+    def forward(image: Tensor) -> Tensor:
+        slices = [image.narrow(dim, shift, size) for shift in range(count)]
         result = image.new_empty((*image.shape[:-2], len(filters), *slices[0].shape[-2:]))
         for index, taps in enumerate(filters):
             total = torch.mul(slices[0], taps[0], out=result.select(-3, index))
@@ -53,12 +48,12 @@ class _Correlation(torch.autograd.Function):
                 total.add_(shifted, alpha=weight)
         return result
 
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
-        total = grad.new_zeros(ctx.shape)
-        for index, taps in enumerate(ctx.filters):
+    def adjoint(grad: Tensor) -> Tensor:
+        total = grad.new_zeros(shape)
+        for index, taps in enumerate(filters):
             part = grad.select(-3, index)
             for shift, weight in enumerate(taps):
-                total.narrow(ctx.dim, shift, grad.shape[ctx.dim]).add_(part, alpha=weight)
-        return total, None, None
+                total.narrow(dim, shift, size).add_(part, alpha=weight)
+        return total
+
+    return linear(forward, adjoint, image)

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 from ..imaging.shifts import mirrored
+from ..optics.linear import linear
 from .base import Metric, gaussian_blur, mix, paired, remembered
 
 SCALES = 4
@@ -65,32 +64,21 @@ def oriented_responses(opponent: Tensor) -> Tensor:
     """Responses of (B, K, H, W) to the bank, (B, 8 K, H, W)."""
     batch, _, height, width = opponent.shape
     padded = mirrored(opponent.reshape(-1, 1, height, width), RADIUS)
-    response: Tensor = _Filtered.apply(padded, _bank(opponent.dtype, opponent.device))  # type: ignore[no-untyped-call]
-    return response.reshape(batch, -1, height, width)
+    bank = _bank(opponent.dtype, opponent.device)
+    return linear(lambda x: functional.conv2d(x, bank), partial(_back, bank), padded).reshape(batch, -1, height, width)
 
 
-class _Filtered(torch.autograd.Function):
-    """``conv2d`` of one channel with an adjoint that takes a fourth of the time of autograd's on a CPU.
+def _back(bank: Tensor, grad: Tensor) -> Tensor:
+    """The adjoint of ``conv2d`` of one channel, in a fourth of the time of autograd's on a CPU.
 
-    The adjoint is computed row by row of the filters: their rows as output channels of one ``conv2d``, then shifted
-    and summed.
+    It is computed row by row of the filters: their rows as output channels of one ``conv2d``, then shifted and added.
     """
-
-    @staticmethod
-    def forward(ctx: Any, image: Tensor, bank: Tensor) -> Tensor:
-        ctx.save_for_backward(bank)
-        return functional.conv2d(image, bank)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
-        (bank,) = ctx.saved_tensors
-        by_row = functional.conv2d(grad, bank.permute(2, 0, 1, 3).flip(-1), padding=(0, 2 * RADIUS))
-        height = grad.shape[-2]
-        total = grad.new_zeros(grad.shape[0], 1, height + 2 * RADIUS, by_row.shape[-1])
-        for row, part in enumerate(by_row.split(1, dim=1)):
-            total[:, :, row : row + height] += part
-        return total, None
+    by_row = functional.conv2d(grad, bank.permute(2, 0, 1, 3).flip(-1), padding=(0, 2 * RADIUS))
+    height = grad.shape[-2]
+    total = grad.new_zeros(grad.shape[0], 1, height + 2 * RADIUS, by_row.shape[-1])
+    for row, part in enumerate(by_row.split(1, dim=1)):
+        total[:, :, row : row + height] += part
+    return total
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class FixedMsSsim:
         _, side = paired(target, target, smallest=self.smallest)
         self.scales = []
         for last in self.is_last:
-            self.scales.append(LocalStatistics(_mirrored(side) if last else side))
+            self.scales.append(LocalStatistics(mirrored(side, RADIUS) if last else side))
             side = functional.avg_pool2d(side, 2)
 
     def __call__(self, image: Tensor) -> Tensor:
@@ -41,7 +41,7 @@ class FixedMsSsim:
         x, _ = paired(image, self.target, smallest=self.smallest)
         value = x.new_ones(x.shape[0])
         for last, scale, exponent in zip(self.is_last, self.scales, self.exponents, strict=True):
-            entire, structure = scale.means(_mirrored(x) if last else x)
+            entire, structure = scale.means(mirrored(x, RADIUS) if last else x)
             mean = entire if last else structure
             # The power of zero has an infinite gradient, so zero is a branch of its own.
             value = value * torch.where(mean > 0, torch.where(mean > 0, mean, 1.0).pow(exponent), 0.0)
@@ -58,10 +58,6 @@ def fitting_scales(shape: tuple[int, int]) -> int:
     [5, 4, 3, 0]
     """
     return sum(min(shape) > _WINDOW * 2**scale for scale in range(len(EXPONENTS)))
-
-
-def _mirrored(image: Tensor) -> Tensor:
-    return mirrored(image, RADIUS)
 
 
 def ms_ssim(image: Tensor, target: Tensor) -> Tensor:

@@ -10,7 +10,6 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -58,8 +57,7 @@ class LocalStatistics:
 
     def means(self, other: Tensor) -> tuple[Tensor, Tensor]:
         """Means of the SSIM and of its contrast-structure factor over channels and windows, (B, C, H, W) to (B,)."""
-        differentiated = torch.is_grad_enabled() and (other.requires_grad or self.image.requires_grad)
-        if other.is_cpu and not differentiated:
+        if usable(other, self.image):
             return _means(other, self.image)
         luminance, structure = self.maps(other)
         return (luminance * structure).mean(dim=(1, 2, 3)), structure.mean(dim=(1, 2, 3))
@@ -97,20 +95,19 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 
 
 def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-    """``LocalStatistics.means`` without a gradient, on a CPU: strip by strip, in threads where that pays."""
+    """``LocalStatistics.means``, compiled: strip by strip, in threads where that pays."""
     batch, channels, height, width = image.shape
     planes = [side.detach().contiguous().view(-1, height, width).numpy() for side in (image, target)]
     inner = height - 2 * RADIUS
     step = max(2 * RADIUS, STRIP // width)
     strips = list(product(range(batch * channels), range(0, inner, step)))
-    sums = _compiled_sums if usable(image, target) else _sums
     totals = np.empty((len(strips), 2))
 
     def compare(some: slice) -> None:
         for index in range(len(strips))[some]:
             plane, first = strips[index]
             rows = slice(first, min(first + step, inner) + 2 * RADIUS)
-            totals[index] = sums(planes[0][plane, rows], planes[1][plane, rows], TAPS)
+            totals[index] = _sums(planes[0][plane, rows], planes[1][plane, rows], TAPS)
 
     # Strips do not depend on the number of threads, and are added in their order: nor does the value.
     in_blocks(compare, image, len(strips), image.numel())
@@ -119,17 +116,7 @@ def _means(image: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     return full, structure
 
 
-def _sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
-    """Sums over the windows in a strip (h, W) of two images of the SSIM and of its contrast-structure factor.
-
-    The SSIM has only the sum of the two variances, so that four filters do.
-    """
-    inside = (slice(RADIUS, -RADIUS),) * 2
-    filtered = (cv2.sepFilter2D(side, -1, taps, taps)[inside] for side in (x, y, x * x + y * y, x * y))
-    structure, entire = _factors(*filtered)
-    return float(entire.sum(dtype=np.float64)), float(structure.sum(dtype=np.float64))
-
-
+@compiled
 def _factors(mean_x: Any, mean_y: Any, squares: Any, products: Any) -> tuple[Any, Any]:
     """Contrast-structure factor and SSIM from the filtered images, the sum of their squares and their product."""
     mean_squares, mean_products = mean_x * mean_x + mean_y * mean_y, mean_x * mean_y
@@ -137,14 +124,13 @@ def _factors(mean_x: Any, mean_y: Any, squares: Any, products: Any) -> tuple[Any
     return structure, structure * (2 * mean_products + C1) / (mean_squares + C1)
 
 
-_compiled_factors = compiled(_factors)
-
-
 @compiled
-def _compiled_sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
-    """``_sums``, each row of windows in one pass: down its columns, then along what they gave.
+def _sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
+    """Sums over the windows in a strip (h, W) of two images of the SSIM and of its contrast-structure factor: each row
+    of windows in one pass, down its columns, then along what they gave.
 
-    A window is symmetric: two pixels at a time have one weight.
+    The SSIM has only the sum of the two variances, so that four filters do. A window is symmetric: two pixels at a
+    time have one weight.
     """
     width = x.shape[1]
     inner = width - 2 * RADIUS
@@ -171,7 +157,7 @@ def _compiled_sums(x: Plane, y: Plane, taps: Plane) -> tuple[float, float]:
                 b += t * (means_y[m - k] + means_y[m + k])
                 s += t * (squares[m - k] + squares[m + k])
                 p += t * (products[m - k] + products[m + k])
-            contrast, similarity = _compiled_factors(a, b, s, p)
+            contrast, similarity = _factors(a, b, s, p)
             entire[c] += similarity
             structure[c] += contrast
     return entire.sum(), structure.sum()

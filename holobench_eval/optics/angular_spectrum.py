@@ -124,17 +124,17 @@ class AngularSpectrum(Convolution):
         check_geometry(shape, pitch, wavelength, pupil)
         if dtype is None:
             dtype = torch.complex128 if padding == "reference" else torch.complex64
-        padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
-        twice = (fast_size(2 * shape[0] - 1), fast_size(2 * shape[1] - 1))
-        optics, where = _Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil), torch.device(device)
-        if padding is None and (padded[0] > twice[0] or padded[1] > twice[1]):
-            padded = (min(padded[0], twice[0]), min(padded[1], twice[1]))
-            grid = padded_shape(shape, pitch, wavelength, distance, pupil, None, DEFAULT_ERROR / 3)
-            transfer = _cut_off_transfer(optics, padded, grid, dtype, where)
-        else:
-            transfer = _band_limited_transfer(optics, padded, dtype, where)
-        super().__init__(optics.shape, transfer)
+        optics = Optics((shape[0], shape[1]), pitch, wavelength, distance, pupil)
+        super().__init__(optics.shape, self._transfer(optics, padding, dtype, torch.device(device)))
         self.pitch, self.wavelength, self.distance, self.pupil = pitch, wavelength, distance, pupil
+
+    @staticmethod
+    def _transfer(optics: Optics, padding: Padding, dtype: torch.dtype, device: torch.device) -> TransferFunction:
+        padded, twice = optics.padded(padding), tuple(fast_size(2 * side - 1) for side in optics.shape)
+        if padding is not None or (padded[0] <= twice[0] and padded[1] <= twice[1]):
+            return _band_limited_transfer(optics, padded, dtype, device)
+        grid = optics.padded(None, DEFAULT_ERROR / 3)
+        return _cut_off_transfer(optics, (min(padded[0], twice[0]), min(padded[1], twice[1])), grid, dtype, device)
 
 
 def check_geometry(shape: tuple[int, int], pitch: float, wavelength: float, pupil: float | None) -> None:
@@ -148,7 +148,7 @@ def check_geometry(shape: tuple[int, int], pitch: float, wavelength: float, pupi
 
 
 @dataclass(frozen=True)
-class _Optics:
+class Optics:
     """What a transfer function depends on, besides its grid: see ``AngularSpectrum``."""
 
     shape: tuple[int, int]
@@ -156,6 +156,10 @@ class _Optics:
     wavelength: float
     distance: float
     pupil: float | None
+
+    def padded(self, padding: Padding, error: float = DEFAULT_ERROR) -> tuple[int, int]:
+        """See ``padding.padded_shape``."""
+        return padded_shape(self.shape, self.pitch, self.wavelength, self.distance, self.pupil, padding, error)
 
     def sampled(self, fy: Tensor, fx: Tensor, padded: tuple[int, int]) -> Tensor:
         """Transfer function, complex128, at frequencies [1/m] of the grid of ``padded`` samples."""
@@ -170,7 +174,7 @@ class _Optics:
 
 @lru_cache(maxsize=24)
 def _band_limited_transfer(
-    optics: _Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
+    optics: Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> TransferFunction:
     fy, fx = frequencies(padded, optics.pitch, device)
     return transfer_function(optics.sampled(fy, fx, padded).to(dtype))
@@ -178,7 +182,7 @@ def _band_limited_transfer(
 
 @lru_cache(maxsize=24)
 def _cut_off_transfer(
-    optics: _Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
+    optics: Optics, padded: tuple[int, int], grid: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> TransferFunction:
     """Transfer function of the kernel of a larger ``grid``, cut off beyond the panel's own size.
 

@@ -18,27 +18,22 @@ class Propagator(Protocol):
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the fields."""
-        ...
 
     @property
     def dtype(self) -> torch.dtype:
         """Of the fields, complex."""
-        ...
 
     def forward(self, field: Tensor) -> Tensor:
         """Propagate a complex field ``(..., H, W)`` from the panel to the image plane."""
-        ...
 
     def adjoint(self, field: Tensor) -> Tensor:
         """The adjoint map: ``<forward(u), v> = <u, adjoint(v)>``."""
-        ...
 
     def carried(self, field: Tensor, back: bool = False, spent: bool = False) -> Tensor:
         """``forward`` or, back, ``adjoint``, of a field in the precision of the model, where no gradient is asked for.
 
         spent: the result may take the place of the field in memory.
         """
-        ...
 
 
 class Convolution:

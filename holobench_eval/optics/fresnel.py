@@ -7,13 +7,13 @@ from functools import lru_cache
 
 import torch
 
-from .angular_spectrum import check_geometry
-from .convolution import Convolution, frequencies, iris
-from .padding import Padding, padded_shape
+from .angular_spectrum import AngularSpectrum, Optics
+from .convolution import frequencies, iris
+from .padding import Padding
 from .transfer import TransferFunction, transfer_function
 
 
-class Fresnel(Convolution):
+class Fresnel(AngularSpectrum):
     """Paraxial transfer-function propagation, ``exp(-i pi lambda z f^2)``, carrier removed (Goodman, section 4.2).
 
     The difference to ``AngularSpectrum`` is the model-approximation error of Chakravarthula et al. 2020, Eq. 8.
@@ -34,37 +34,15 @@ class Fresnel(Convolution):
     torch.Size([32, 32])
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int],
-        pitch: float,
-        wavelength: float,
-        distance: float,
-        pupil: float | None = None,
-        padding: Padding = None,
-        dtype: torch.dtype | None = None,
-        device: torch.device | str = "cpu",
-    ) -> None:
-        check_geometry(shape, pitch, wavelength, pupil)
-        if dtype is None:
-            dtype = torch.complex128 if padding == "reference" else torch.complex64
-        padded = padded_shape(shape, pitch, wavelength, distance, pupil, padding)
-        super().__init__(
-            (shape[0], shape[1]),
-            _paraxial_transfer(padded, pitch, wavelength, distance, pupil, dtype, torch.device(device)),
-        )
+    @staticmethod
+    def _transfer(optics: Optics, padding: Padding, dtype: torch.dtype, device: torch.device) -> TransferFunction:
+        return _paraxial_transfer(optics, optics.padded(padding), dtype, device)
 
 
 @lru_cache(maxsize=24)
 def _paraxial_transfer(
-    padded: tuple[int, int],
-    pitch: float,
-    wavelength: float,
-    distance: float,
-    pupil: float | None,
-    dtype: torch.dtype,
-    device: torch.device,
+    optics: Optics, padded: tuple[int, int], dtype: torch.dtype, device: torch.device
 ) -> TransferFunction:
-    fy, fx = frequencies(padded, pitch, device)
-    phase = -math.pi * wavelength * distance * (fy**2 + fx**2)
-    return transfer_function(torch.polar(iris(fy, fx, pitch, pupil), phase).to(dtype))
+    fy, fx = frequencies(padded, optics.pitch, device)
+    phase = -math.pi * optics.wavelength * optics.distance * (fy**2 + fx**2)
+    return transfer_function(torch.polar(iris(fy, fx, optics.pitch, optics.pupil), phase).to(dtype))

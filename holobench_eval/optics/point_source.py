@@ -88,12 +88,7 @@ def impulse_response(y: Tensor, x: Tensor, wavelength: float, distance: float) -
 
 @lru_cache(maxsize=8)
 def _kernel_transfer(
-    shape: tuple[int, int],
-    pitch: float,
-    wavelength: float,
-    distance: float,
-    dtype: torch.dtype,
-    device: torch.device,
+    shape: tuple[int, int], pitch: float, wavelength: float, distance: float, dtype: torch.dtype, device: torch.device
 ) -> TransferFunction:
     padded = tuple(fast_size(2 * size - 1) for size in shape)
     offsets = []

@@ -14,7 +14,7 @@ from torch.nn import functional
 from ...optics.phasor import squared_modulus
 from ..descent import cosine_decay
 from ..learned.retrieval import Image
-from ..learned.samples import Sample
+from ..learned.samples import Approximator, Sample
 from ..learned.weights import load_moments, refuse_other_weights
 from .terms import Haze
 
@@ -62,7 +62,7 @@ class PredictedCapture(nn.Module):
         return capture + added
 
 
-class ModelApproximator:
+class ModelApproximator(Approximator):
     """A model of the display, terms and a network, see ``PredictedCapture``; all learn from one loss."""
 
     LOSS: ClassVar[str] = "l1"
@@ -103,10 +103,6 @@ class ModelApproximator:
         """The display with the parameters as they are now, held."""
         held = copy.deepcopy(self._capture).requires_grad_(False)
         return lambda phase: held(phase, light)
-
-    def predicted(self, sample: Sample) -> Tensor:
-        """What is expected of the capture of a sample, ``(C, h, w)``."""
-        return self.image(sample.light)(sample.phase)
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar
 
 import torch
 from annotated_types import Interval
@@ -18,23 +18,15 @@ from torch import Tensor
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
-from ...display.metered import MeteredDisplay
+from ...display.metered import MeteredDisplay, Solver
 from ...display.training import TrainingBench
 from ...optics.phase import TAU, blaze, wrap
-from ..common import Bench, matched
+from ..common import matched
 from ..double_phase import DoublePhase
 from ..wirtinger import Wirtinger
 
 COARSE = tuple(2 ** (step / 4) for step in range(-4, 5))  # 0.5 to 2, and 1 among them
 FINE = tuple(2 ** (step / 12) for step in (-2, -1, 1, 2))  # times the best: steps of 6 %
-
-
-class OpenLoop(Protocol):
-    """A method that knows the nominal optics alone."""
-
-    def solve(self, target: Tensor, bench: Bench) -> Tensor:
-        """Linear intensity ``(B, C, h, w)`` to phase ``(B, C, H, W)`` [rad]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -57,7 +49,7 @@ class PhaseGamma(ABC):
 
     @property
     @abstractmethod
-    def of(self) -> OpenLoop:
+    def of(self) -> Solver:
         """The open-loop method: a parameter of every subclass."""
 
     def prepare(self, bench: TrainingBench) -> Mapping[str, Any]:

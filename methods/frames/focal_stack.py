@@ -6,7 +6,7 @@ holographic near-eye displays with fast heavily-quantized spatial light modulato
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ from torch import Tensor
 
 from ..common import Bench, unit_field
 from ..losses import intensity_l2
-from .random_frames import FromRandomFrames
+from .random_frames import FromRandomFrames, Loss
 
 
 @dataclass(frozen=True)
@@ -31,21 +31,15 @@ class FocalStack(FromRandomFrames):
     planes: ClassVar[bool] = True
     fresnel: ClassVar[bool] = True
 
-    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Loss:
         """One plane, that of the display."""
         return self._stack_loss(target[None], (0.0,), bench, channel)
 
     def solve_planes(self, targets: Tensor, offsets: Sequence[float], bench: Bench) -> Tensor:
         """As ``MultiPlane.solve_planes``: phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad]."""
-        solved = []
-        for channel, stack in enumerate(targets.unbind(1)):
-            loss = self._stack_loss(stack[:, None], offsets, bench, channel)
-            solved.append(self.descend(loss, stack[:1], bench, channel))
-        return torch.stack(solved, dim=-3)[0]
+        return self.of_scene(targets, bench, lambda stack, colour: self._stack_loss(stack, offsets, bench, colour))
 
-    def _stack_loss(
-        self, stack: Tensor, offsets: Sequence[float], bench: Bench, channel: int
-    ) -> Callable[[Tensor], Tensor]:
+    def _stack_loss(self, stack: Tensor, offsets: Sequence[float], bench: Bench, channel: int) -> Loss:
         """The mean squared error of the planes of ``(P, B, h, w)`` (Choi et al. 2022, the loss of focal stacks)."""
         spec, region = bench.spec, bench.spec.region
         kind = torch.complex(stack, stack).dtype

@@ -10,7 +10,7 @@ realism", ACM Trans. Graph. 43(4), 68 (2024).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -22,7 +22,7 @@ from ...display.api import DisplaySpec
 from ...optics.convolution import frequencies, iris
 from ..common import Bench, nominal_model, unit_field
 from ..losses import intensity_l2
-from .random_frames import FromRandomFrames
+from .random_frames import FromRandomFrames, Loss
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class LightField(FromRandomFrames):
     fresnel: ClassVar[bool] = True
     views: ClassVar[bool] = True
 
-    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Loss:
         """The squared error of a flat picture at all places."""
         places = [(0.0, 0.0)]
         for ring in range(1, self.rings + 1):
@@ -61,15 +61,12 @@ class LightField(FromRandomFrames):
     def solve_views(self, targets: Tensor, places: Sequence[float], bench: Bench) -> Tensor:
         """Linear intensities ``(V, C, h, w)`` in [0, 1], seen by a pupil at places sideways from the axis [radii of the
         iris], to a phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad]."""
-        solved = []
-        for channel, views in enumerate(targets.unbind(1)):
-            loss = self._light_field_loss(views[:, None], [(0.0, place) for place in places], bench, channel)
-            solved.append(self.descend(loss, views[:1], bench, channel))
-        return torch.stack(solved, dim=-3)[0]
+        axial = [(0.0, place) for place in places]
+        return self.of_scene(targets, bench, lambda views, colour: self._light_field_loss(views, axial, bench, colour))
 
     def _light_field_loss(
         self, views: Tensor, places: Sequence[tuple[float, float]], bench: Bench, channel: int
-    ) -> Callable[[Tensor], Tensor]:
+    ) -> Loss:
         """The squared error of views ``(V, B, h, w)`` (Choi et al. 2022, the loss of light fields)."""
         model, region = nominal_model(bench, channel, views[0]), bench.spec.region
         pupils = self._pupils(bench.spec, places).to(views.device, views.dtype)

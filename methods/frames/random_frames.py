@@ -24,6 +24,8 @@ from ..common import Bench, ByColour, nominal_model, unit_field
 from ..descent import adam, by_autograd
 from ..losses import intensity_l2
 
+Loss = Callable[[Tensor], Tensor]
+
 
 @dataclass(frozen=True)
 class FromRandomFrames(ByColour):
@@ -52,14 +54,14 @@ class FromRandomFrames(ByColour):
             raise UserError(f"frames: {self.frames}; '{spec.name}' shows {spec.frames} at most in an exposure")
 
     @abstractmethod
-    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Loss:
         """The loss ``(B F,)`` of phases ``(B F, H, W)`` [rad] for a target ``(B, h, w)``."""
 
     def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         """The frames of the least loss that was seen."""
         return self.descend(self.loss(target, bench, channel), target, bench, channel)
 
-    def descend(self, loss: Callable[[Tensor], Tensor], target: Tensor, bench: Bench, channel: int) -> Tensor:
+    def descend(self, loss: Loss, target: Tensor, bench: Bench, channel: int) -> Tensor:
         """`retrieve` for a loss of the frames of every target ``(B, h, w)``."""
         draw = bench.generator("random frames", channel)
         start = TAU * torch.rand((self.frames, *bench.spec.shape), generator=draw, dtype=torch.float64)
@@ -69,6 +71,15 @@ class FromRandomFrames(ByColour):
             levels = Levels(bench.spec, channel, frames)
             frames = levels.shown_by(levels.nearest(frames))
         return frames if self.frames == 1 else frames.unflatten(0, (-1, self.frames))
+
+    def of_scene(self, pictures: Tensor, bench: Bench, loss: Callable[[Tensor, int], Loss]) -> Tensor:
+        """A phase ``(C, H, W)``, or of several frames ``(F, C, H, W)`` [rad], for pictures ``(P, C, h, w)`` of a scene.
+
+        loss: that of the pictures ``(P, 1, h, w)`` of a colour.
+        """
+        colours = enumerate(pictures.unbind(1))
+        solved = [self.descend(loss(own[:, None], channel), own[:1], bench, channel) for channel, own in colours]
+        return torch.stack(solved, dim=-3)[0]
 
 
 @dataclass(frozen=True)
@@ -90,7 +101,7 @@ class RandomFrames(FromRandomFrames):
 
     title: ClassVar[str] = "frames of random phase, Choi 2022"
 
-    def loss(self, target: Tensor, bench: Bench, channel: int) -> Callable[[Tensor], Tensor]:
+    def loss(self, target: Tensor, bench: Bench, channel: int) -> Loss:
         """The squared error of the mean of all frames, or of each (Choi et al. 2022, Lee et al. 2022)."""
         model, region = nominal_model(bench, channel, target), bench.spec.region
         shared = self.frames if self.together else 1  # frames that a loss is of

@@ -11,15 +11,15 @@ from torch import Tensor
 from ...display.api import DisplaySpec
 from ..common import matched, unit_field
 from ..learned.retrieval import Image, Verdict
-from ..learned.samples import Sample
+from ..learned.samples import Approximator, Sample
 from ..learned.weights import refuse_other_weights
 from .approximator_loss import PUBLISHED_RATES, ApproximatorLoss, LearningRates
 from .critic import Critic
 from .networks import Network
-from .trainer import trainer
+from .trainer import Trainer
 
 
-class NetworkApproximator:
+class NetworkApproximator(Approximator):
     """D: ideal intensity to captured intensity, both in the region, all colours at once (Eq. 18-19).
 
     Parameters
@@ -59,7 +59,7 @@ class NetworkApproximator:
     ) -> None:
         channels = len(spec.wavelengths)
         self.spec = spec
-        self.trainer = trainer(network, loss, channels, channels, seed, rates)
+        self.trainer = Trainer(network, loss, channels, seed, rates)
         self.gain = self.ideal_gain = torch.ones(channels)
         self.of_amplitude = of_amplitude
         self.critic = Critic(channels, network, seed) if with_critic else None
@@ -119,10 +119,6 @@ class NetworkApproximator:
             return (predicted.square() if self.of_amplitude else predicted) / self.gain.view(-1, 1, 1)
 
         return display
-
-    def predicted(self, sample: Sample) -> Tensor:
-        """What is expected of the capture of a sample, ``(C, h, w)``."""
-        return self.image(sample.light)(sample.phase)
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""

@@ -111,18 +111,15 @@ class Network:
         switches = {name: getattr(self, name) for name in SWITCHES}
         return draw_weights(Generator(inputs, outputs, levels, width, **switches), PIX2PIX_DEVIATION)
 
-    def discriminator(self, channels: int, condition: int | None = None) -> Discriminator | None:
-        """The discriminator of images with so many channels; None for networks that are published without.
-
-        condition: channels of the ideal intensity it is conditioned on, as many as the image's if None.
-        """
-        seen = (channels if condition is None else condition) if self.conditional else 0
-        if self.name == "proposed":
-            return draw_weights(PatchDiscriminator(channels, seen, self.filters), PIX2PIX_DEVIATION)
-        if self.name == "pix2pix":
-            return draw_weights(PatchDiscriminator(channels, seen, self.filters, flat=2), PIX2PIX_DEVIATION)
+    def discriminator(self, channels: int) -> Discriminator | None:
+        """The discriminator of images with so many channels, and of ideal intensities with as many where it is
+        conditional; None for networks that are published without."""
+        seen = channels if self.conditional else 0
         if self.name == "pix2pixhd":
             return draw_weights(MultiScaleDiscriminator(channels, seen, self.filters), PIX2PIX_DEVIATION)
+        if self.name in ("proposed", "pix2pix"):
+            flat = 3 if self.name == "proposed" else 2
+            return draw_weights(PatchDiscriminator(channels, seen, self.filters, flat=flat), PIX2PIX_DEVIATION)
         return None
 
     @property

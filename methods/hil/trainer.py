@@ -28,27 +28,35 @@ from .approximator_loss import (
     feature_matching_loss,
     published_loss,
 )
-from .networks import Discriminator, FromIdentity, Network
+from .networks import FromIdentity, Network
 from .perceptual import perceptual_loss
 
 
 class Trainer:
     """A generator and, if the loss asks for one, a discriminator, with an Adam optimiser each (Section 5.2).
 
-    noise: state of the random numbers for dropout; a step draws from its own and leaves torch's as they are.
+    For intensities with so many channels; ``loss`` None takes the published one. A step draws the random numbers of
+    dropout from its own and leaves torch's as they are. Raises UserError where the loss needs a discriminator and the
+    network has none.
     """
 
     def __init__(
         self,
-        generator: nn.Module,
-        discriminator: Discriminator | None,
-        loss: ApproximatorLoss,
-        rates: LearningRates,
-        noise: Tensor,
+        network: Network,
+        loss: ApproximatorLoss | None,
+        channels: int,
+        seed: int,
+        rates: LearningRates = PUBLISHED_RATES,
     ) -> None:
-        self.generator, self.discriminator, self.loss, self.rates = generator, discriminator, loss, rates
-        self.perceptual = perceptual_loss() if loss.perceptual else None
-        self._noise = noise
+        self.loss, self.rates = published_loss(network) if loss is None else loss, rates
+        with seeded("aberration approximator", seed):
+            generator = network.generator(channels, channels)
+            self.generator = generator if network.name == "identity" else FromIdentity(generator)
+            self.discriminator = network.discriminator(channels) if self.loss.needs_discriminator else None
+        if self.loss.needs_discriminator and self.discriminator is None:
+            raise UserError(f"loss: network '{network.name}' has no discriminator; set 'adversarial' to 0")
+        self.perceptual = perceptual_loss() if self.loss.perceptual else None
+        self._noise = seeds.generator("dropout", seed).get_state()
         self._optimisers = self._fresh_optimisers()
 
     def to(self, device: torch.device) -> Self:
@@ -168,26 +176,3 @@ class Trainer:
         except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:
             reason = (str(error).splitlines() or [type(error).__name__])[0]
             raise UserError(f"the saved training does not fit: {reason}; remove it to train anew") from error
-
-
-def trainer(
-    network: Network,
-    loss: ApproximatorLoss | None,
-    inputs: int,
-    outputs: int,
-    seed: int,
-    rates: LearningRates = PUBLISHED_RATES,
-) -> Trainer:
-    """A fresh trainer for intensities with so many channels; ``loss`` None takes the published one.
-
-    Raises UserError where the loss needs a discriminator and the network has none.
-    """
-    loss = published_loss(network) if loss is None else loss
-    with seeded("aberration approximator", seed):
-        generator = network.generator(inputs, outputs)
-        if network.name != "identity":
-            generator = FromIdentity(generator)
-        discriminator = network.discriminator(outputs, inputs) if loss.needs_discriminator else None
-    if loss.needs_discriminator and discriminator is None:
-        raise UserError(f"loss: network '{network.name}' has no discriminator; set 'adversarial' to 0")
-    return Trainer(generator, discriminator, loss, rates, seeds.generator("dropout", seed).get_state())

@@ -17,7 +17,6 @@ from ...display.training import TrainingBench, TrainingImage
 from ..wirtinger import Wirtinger
 from .algorithm import train
 from .fallback import WIRTINGER, fell_back
-from .method import frozen, hologram, predicted
 from .retrieval import Image, PhaseRetrieval, left_out
 from .samples import Approximator, Sample, Schedule
 
@@ -75,7 +74,7 @@ class LearnedLoop(ABC, Generic[A]):
         """
         approximator = self.approximator(bench.spec)
         approximator.to(bench.device)
-        start, samples = partial(hologram, self.start, bench=bench), self._samples(approximator, bench)
+        start, samples = partial(bench.solved, self.start), self._samples(approximator, bench)
         train(bench, approximator, start, partial(self._search, approximator), self.training, samples)
 
         def solve(image: TrainingImage) -> Tensor:
@@ -92,14 +91,23 @@ class LearnedLoop(ABC, Generic[A]):
         """
         if bench.learned["fell_back"]:
             return bench.solved(WIRTINGER, target)
-        approximator = frozen(self.approximator(bench.spec), bench)
+        approximator = self._learned(bench)
         display, start = approximator.image(bench.light), bench.solved(self.start, target)
         pairs = zip(target, start, strict=True)
         return torch.stack([self._retrieve(approximator, display, *pair) for pair in pairs])
 
     def predict(self, phase: Tensor, bench: MeteredDisplay) -> Tensor:
         """Phase ``(B, C, H, W)`` [rad] to the capture ``(B, C, h, w)``, linear light, that was learned to follow."""
-        return predicted(frozen(self.approximator(bench.spec), bench).image(bench.light), phase)
+        display = self._learned(bench).image(bench.light)
+        with torch.no_grad():
+            return torch.stack([display(panel) for panel in phase])
+
+    def _learned(self, bench: MeteredDisplay) -> A:
+        """D with what was learned; UserError where that is another network's."""
+        approximator = self.approximator(bench.spec)
+        approximator.to(bench.device)
+        approximator.load_learned(bench.learned)
+        return approximator
 
     def _samples(self, approximator: A, bench: TrainingBench) -> Sequence[Sample]:
         """Captures that every round learns from, beside its own."""

@@ -109,6 +109,7 @@ class Approximator(Protocol):
 
     def predicted(self, sample: Sample) -> Tensor:
         """What it expects of the capture of a sample, ``(C, h, w)``."""
+        return self.image(sample.light)(sample.phase)
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
@@ -124,11 +125,7 @@ class Approximator(Protocol):
 
 
 def captured(
-    bench: TrainingBench,
-    keys: Sequence[str],
-    phases: Sequence[Tensor],
-    images: Sequence[TrainingImage],
-    *names: object,
+    bench: TrainingBench, keys: Sequence[str], phases: Sequence[Tensor], images: Sequence[TrainingImage], *names: object
 ) -> Iterator[Sample]:
     """Captures of phases, announced together and each kept under its key; ``names`` decide on their noise."""
     bench.announce((phase, image, names) for phase, image in zip(phases, images, strict=True))

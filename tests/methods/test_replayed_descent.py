@@ -14,7 +14,7 @@ from holobench_eval.display import load_profile
 from holobench_eval.methods.descent import adam, by_autograd
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.tuned import SmoothStart
 from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES

@@ -7,14 +7,7 @@ import torch
 
 from holobench_eval.optics.angular_spectrum import angular_spectrum_phase
 from holobench_eval.optics.kernel.sizes import fast_size
-from holobench_eval.optics.padding import (
-    DEFAULT_ERROR,
-    IRIS_EDGE,
-    padded_shape,
-    padded_size,
-    spread,
-    tail_error,
-)
+from holobench_eval.optics.padding import DEFAULT_ERROR, IRIS_EDGE, padded_shape, padded_size, spread, tail_error
 from holobench_eval.testing.propagation_reference import PITCH, WAVELENGTH
 
 

@@ -19,8 +19,8 @@ from holobench_eval.core.device import CPU
 from holobench_eval.display import Profile, load_profile
 from holobench_eval.display.simulated.geometry import Geometry
 from holobench_eval.display.simulated.panel_light import PanelLight
-from holobench_eval.display.simulated.path import LightPath, image
-from holobench_eval.display.simulated.pipeline import ChannelMaps, SimulatedBench
+from holobench_eval.display.simulated.path import LightPath
+from holobench_eval.display.simulated.pipeline import ChannelMaps, SimulatedBench, seen
 from holobench_eval.display.simulated.stages import LookUpTable
 from holobench_eval.display.simulated.stages.panel import straight_through_level
 from holobench_eval.optics.phase import TAU
@@ -51,9 +51,7 @@ class Outside(SimulatedBench):
 
     def seen(self, maps: ChannelMaps, panel: PanelLight, level: Tensor, drive: Tensor) -> Tensor:
         """Light at the image plane, of a panel that is driven as it is; drive [rad / TURNS]."""
-        if panel.ready(drive):
-            return maps.path.intensity(panel.rows(drive, 1.0))
-        return squared_modulus(image(maps.path, panel.field(drive, 1.0)))
+        return seen(maps.path, panel, drive, 1.0)
 
 
 class Strange(Outside):
@@ -118,7 +116,7 @@ class Coupled(Outside):
         g, step = level / 2**self.spec.bits, (_left(drive) - drive) * (TURNS / TAU)
         loss = self.ABSORBED * (4 * g * (1 - g) - 2 / 3) + self.DEPOLARISED * step.square()
         field, still = panel.field(drive, 1.0), panel.unmodulated * panel.incident
-        return squared_modulus(image(maps.path, field - loss * (field - still)))
+        return squared_modulus(maps.path.forward(field - loss * (field - still)))
 
 
 class Tilted(Outside):
@@ -156,7 +154,7 @@ class Tilted(Outside):
     def seen(self, maps: ChannelMaps, panel: PanelLight, level: Tensor, drive: Tensor) -> Tensor:
         """Of the field that the planes around each place have."""
         field, w, (before, behind) = panel.field(drive, 1.0), self.defocus, self.planes[maps.geometry]
-        near, middle, far = (image(path, field) for path in (before, maps.path, behind))
+        near, middle, far = (path.forward(field) for path in (before, maps.path, behind))
         return squared_modulus((1 - w.abs()) * middle + w.clamp_min(0) * far - w.clamp_max(0) * near)
 
     def intensity(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:

@@ -8,9 +8,8 @@ import torch
 from torch import Tensor
 
 from ...optics.fourier import fourier_matrix
-from ...optics.phasor import squared_modulus
+from ...optics.linear import linear
 from .geometry import Geometry
-from .path import Light
 from .stages.crosstalk import sample_positions
 from .stages.propagation import Propagation
 
@@ -47,14 +46,13 @@ class FourierPath:
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
+        return linear(self._ahead, self.adjoint, field)
+
+    def _ahead(self, field: Tensor) -> Tensor:
         light = field.movedim(1, 2).reshape(self.rows.shape[1], self.columns.shape[1])
         return self.rows @ light @ self.columns.mT
 
     def adjoint(self, image: Tensor) -> Tensor:
-        """See ``LightPath``."""
+        """The adjoint of ``forward``."""
         n, (height, width) = self.samples, self.shape
         return (self.rows.mH @ image @ self.columns.conj()).view(n, height, n, width).movedim(2, 1).contiguous()
-
-    def intensity(self, light: Light) -> Tensor:
-        """See ``LightPath``."""
-        return squared_modulus(self.forward(light(slice(0, self.shape[0]))))

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ...optics.blocks import in_blocks
 from ...optics.kernel.sizes import LANES, steps
+from ...optics.linear import linear
 from ...optics.transfer import Grid, Numbers, axis, kernel, tile_starts, tiled
 from .path import Light, LightPath, OpticalPath
 
@@ -20,7 +21,7 @@ def quickest(path: OpticalPath, device: torch.device) -> LightPath:
     """The path on a device: by the kernel where it can be."""
     ready = device.type == "cpu" and path.transfer.dtype == torch.complex64
     if kernel() is None or not ready or None in map(steps, path.transfer.shape) or path.transfer.shape[1] < 2 * LANES:
-        return path.to(device)
+        return path.changed(lambda factor: factor.to(device))
     return FusedPath(path)
 
 
@@ -51,11 +52,11 @@ class FusedPath:
         last = torch.ones_like(first) if path.last is None else path.last
         through = first * last
         self._change, self._dusty, ends = None, np.arange(0), (through, through)
-        if path.dust is not None and len(path.dust.rows):
-            self._dusty = (path.dust.rows // LANES).unique().numpy()
+        if path.dust is not None and path.dust.any():
+            self._dusty = (path.dust.any(1).nonzero().flatten() // LANES).unique().numpy()
             # Both ends' transforms are divided by their size in ``first`` alone: the light that passes meets it once.
             change = first.new_zeros(LANES * -(-height // LANES), width)
-            change[path.dust.rows] = path.dust.change / first.numel()
+            change[:height] = path.dust / first.numel()
             lanes = torch.view_as_real(change.view(-1, LANES, width)[self._dusty]).permute(0, 2, 3, 1)
             self._change, ends = lanes.contiguous(), (first, last * first.numel())
         starts = [tile_starts(end) for end in ends]
@@ -78,6 +79,9 @@ class FusedPath:
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""
+        return linear(self._ahead, self.adjoint, field)
+
+    def _ahead(self, field: Tensor) -> Tensor:
         source, target = self._panel, self._image
         tiles = self._pass(_spectra(source.grid, field.to(torch.complex64)), source, target, conjugated=False)
         seen = field.new_empty(target.grid.shape[1:], dtype=torch.complex64)
@@ -85,7 +89,7 @@ class FusedPath:
         return seen
 
     def adjoint(self, image: Tensor) -> Tensor:
-        """See ``LightPath``."""
+        """The adjoint of ``forward``."""
         source, target = self._image, self._panel
         tiles = self._pass(_spectra(source.grid, image), source, target, conjugated=True)
         planes, height, width = target.grid.shape
@@ -94,7 +98,8 @@ class FusedPath:
         return field
 
     def intensity(self, light: Light) -> Tensor:
-        """See ``LightPath``. The light of a few rows is transformed while it is in the cache."""
+        """The squared modulus of what ``forward`` gives of all rows of a light, without a gradient: the light of a few
+        rows is transformed while it is in the cache."""
         spectra, grid = self._panel.grid.tiles(), self._panel.grid
         planes, height, width = grid.shape
         blocks = -(-height // LANES)

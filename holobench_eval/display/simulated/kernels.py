@@ -180,13 +180,13 @@ def show_row(phase: Plane, added: Plane, levels: Any, level: Any, out: Plane) ->
 
 
 @compiled
-def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: int, top: int, out: Plane) -> None:
+def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: int, out: Plane) -> None:
     """The light of the sub-samples in rows ``first`` to ``last`` of the panel; see ``PanelLight.field``.
 
     lit: phase, what is added to it, gain of each pixel and of the frame, shares of the neighbours ``(2, samples,
     taps)``, light that follows no phase ``(samples, samples, 2)`` and incident light ``(H, 2 W)``; table: phase [rad]
-    of each gray level; out ``(samples, samples, rows, 2 W)``: the rows from ``top`` on. Complex numbers are real and
-    imaginary parts in turn.
+    of each gray level; out ``(samples, samples, last - first, 2 W)``. Complex numbers are real and imaginary parts in
+    turn.
     """
     phase, added, gain, factor, taps, unmodulated, incident = lit
     height, width = phase.shape
@@ -201,7 +201,7 @@ def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: in
         driven[r, reach + width :] = driven[r, reach + width - 1]
     line, fine = np.empty(width + 2 * reach, np.float32), np.empty(width, np.float32)
     for r in range(rows):
-        light, place = incident[first + r], first + r - top
+        light = incident[first + r]
         for j in range(samples):
             line[:] = 0
             for k in range(taps.shape[2]):
@@ -216,8 +216,8 @@ def modulate_rows(lit: Any, table: Plane, modulated: Plane, first: int, last: in
                 for c in range(width):
                     sine, cosine = sincos(fine[c])
                     a, b = share * cosine + real, share * sine + imaginary
-                    out[j, i, place, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
-                    out[j, i, place, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]
+                    out[j, i, r, 2 * c] = a * light[2 * c] - b * light[2 * c + 1]
+                    out[j, i, r, 2 * c + 1] = a * light[2 * c + 1] + b * light[2 * c]
 
 
 @compiled

@@ -48,8 +48,8 @@ class PanelLight:
     lut_bend: Tensor | None = None
 
     def ready(self, phase: Tensor) -> bool:
-        """Whether compiled functions can light the panel with this phase; see ``ready``."""
-        return self.lut_bend is None and ready(phase)
+        """Whether compiled functions can light the panel with this phase, and need no gradient."""
+        return self.lut_bend is None and usable(phase) and phase.dtype == torch.float32
 
     def field(self, phase: Tensor, gain: float) -> Tensor:
         """Field ``(samples, samples, H, W)`` of the sub-samples, the carrier off, of ``phase`` ``(H, W)`` [rad].
@@ -76,21 +76,16 @@ class PanelLight:
         def light(rows: slice) -> Tensor:
             some = (samples, samples, rows.stop - rows.start, phase.shape[1])
             field = torch.empty(some, dtype=torch.complex64, device="cpu")
-            modulate_rows(lit, *shares, rows.start, rows.stop, rows.start, _planes(field))
+            modulate_rows(lit, *shares, rows.start, rows.stop, _planes(field))
             return field
 
         return light
 
     def whole(self, phase: Tensor, gain: float) -> Tensor:
         """``field``, compiled and without a gradient."""
-        lit, samples = self._lit(phase, gain), self.weights.shape[1]
-        field = torch.empty((samples, samples, *phase.shape), dtype=torch.complex64, device="cpu")
-        shares, parts = (self._curve[0], self.modulated[:, :, 0, 0].numpy()), _planes(field)
-
-        def light(rows: slice) -> None:
-            modulate_rows(lit, *shares, rows.start, rows.stop, 0, parts)
-
-        in_blocks(light, field, len(phase), field.numel())
+        light, shape = self.rows(phase, gain), (*self.modulated.shape[:2], *phase.shape)
+        field = torch.empty(shape, dtype=torch.complex64, device="cpu")
+        in_blocks(lambda rows: field[:, :, rows].copy_(light(rows)), field, len(phase), field.numel())
         return field
 
     def back(self, grad: Tensor, field: Tensor, phase: Tensor, gain: float) -> Tensor:
@@ -133,11 +128,6 @@ class _Lit(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
         phase, field = ctx.saved_tensors
         return ctx.light.back(grad, field, phase, ctx.gain), None, None
-
-
-def ready(phase: Tensor) -> bool:
-    """Whether compiled functions can light a panel with this phase, and need no gradient."""
-    return usable(phase) and phase.dtype == torch.float32
 
 
 def _floats(field: Tensor) -> Floats:

@@ -19,14 +19,13 @@ from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
 from ...optics.phasor import squared_modulus
-from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fourier_path import FourierPath
-from .fused_path import quickest
+from .fused_path import FusedPath, quickest
 from .geometry import Geometry
 from .noise import normal
 from .panel_light import PanelLight
-from .path import Dust, LightPath, OpticalPath, image
+from .path import LightPath, OpticalPath
 from .profile import Profile
 from .stages.propagation import sample_weights
 from .stages.relay import finer_grid, sample, sampling_grid
@@ -164,18 +163,9 @@ class SimulatedBench:
         fy, fx = frequencies(padded, geometry.pitch)
         for factor in present(stage.transmission(fy, fx, geometry) for stage in profile.stages):
             legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
-        return quickest(
-            OpticalPath(
-                shape=geometry.shape,
-                rows=rows,
-                columns=columns,
-                transfer=by_columns(legs[0]),
-                dust=None if plane is None else Dust.of(plane.to(legs[0].dtype)),
-                last=None if plane is None else by_columns(legs[1]),
-                finer=self.image_samples,
-            ),
-            self.device,
-        )
+        dust, last = (None, None) if plane is None else (plane - 1, legs[1])
+        path = OpticalPath(geometry.shape, rows, columns, legs[0], dust, last, self.image_samples)
+        return quickest(path, self.device)
 
     def _padded(self) -> tuple[int, int]:
         """One size for all channels: that of the longest wavelength, whose light spreads furthest."""
@@ -201,15 +191,10 @@ class SimulatedBench:
         """
         if tuple(phase.shape) != tuple(self.profile.panel.shape):  # compiled code would read beyond it
             raise ValueError(f"phase is {tuple(phase.shape)}, the panel is {tuple(self.profile.panel.shape)}")
-        gain = flicker * self.drift_gain
-
-        def of_line(maps: ChannelMaps, gain: float) -> Tensor:
-            if maps.light.ready(phase):
-                return maps.path.intensity(maps.light.rows(phase, gain))
-            return squared_modulus(image(maps.path, maps.light.field(phase, gain)))
-
-        moments = self.profile.flicker.moments
-        light = reduce(add, (of_line(maps, gain * moment) for maps in self.lines[channel] for moment in moments))
+        gain, moments = flicker * self.drift_gain, self.profile.flicker.moments
+        light = reduce(
+            add, (seen(maps.path, maps.light, phase, gain * m) for maps in self.lines[channel] for m in moments)
+        )
         return light if len(moments) == 1 else light / len(moments)
 
     def integrated(self, phase: Tensor, channel: int, flicker: float = 1.0) -> Tensor:
@@ -249,6 +234,13 @@ class SimulatedBench:
         seen = sample(light, self.fine_grid[rows], 1).cpu()
         noise = normal(key, rows, frame.shape[1])
         frame[rows] = self.profile.sensor.expose(seen, electrons, self.response[rows], noise, channel)
+
+
+def seen(path: LightPath, light: PanelLight, phase: Tensor, gain: float) -> Tensor:
+    """Intensity ``(n H, n W)`` at the image plane, of the light of one line of the source; see ``PanelLight.field``."""
+    if isinstance(path, FusedPath) and light.ready(phase):
+        return path.intensity(light.rows(phase, gain))
+    return squared_modulus(path.forward(light.field(phase, gain)))
 
 
 def present(tensors: Iterable[Tensor | None]) -> Iterator[Tensor]:

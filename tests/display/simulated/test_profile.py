@@ -90,31 +90,20 @@ def test_a_profile_like_another_has_its_values_where_it_gives_none(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("mine", "base", "message"),
     [
-        ("name: mine\nlike: leto-agde\n", r"mine.yaml:2:7: unknown profile 'leto-agde'; did you mean 'leto-aged'"),
-        ("name: mine\nlike: mine.yaml\n", r"mine.yaml:2:7: more than 4 profiles, each of them like the next"),
-        ("name: mine\nlike: ideal\nsensor: 3\n", r"mine.yaml:3:9: sensor should be a mapping"),
+        ("like: leto-agde", "", r"mine.yaml:2:7: unknown profile 'leto-agde'; did you mean 'leto-aged'"),
+        ("like: mine.yaml", "", r"mine.yaml:2:7: more than 4 profiles, each of them like the next"),
+        ("like: ideal\nsensor: 3", "", r"mine.yaml:3:9: sensor should be a mapping"),
+        ("like: base.yaml", "crosstalk: {widht: 3}", r"/base.yaml:2:13: unknown key 'widht'"),
+        ("like: base.yaml", "crosstalk: {width: wide}", r"/base.yaml:2:20: crosstalk.width"),
+        ("like: base.yaml", "panel: {bits: 5}", r"/base.yaml:\d+:\d+: .*16 entries; a panel of 5 bits has 32"),
     ],
 )
-def test_a_profile_like_none_or_like_itself_is_refused(tmp_path, text, message):
-    (tmp_path / "mine.yaml").write_text(text)
+def test_a_fault_is_told_of_the_file_that_has_it_the_profile_or_its_base(tmp_path, mine, base, message):
+    (tmp_path / "base.yaml").write_text(f"like: plm-4bit\n{base}\n")
+    (tmp_path / "mine.yaml").write_text(f"name: mine\n{mine}\n")
     with pytest.raises(UserError, match=message):
-        load_profile("mine.yaml", tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("base", "place"),
-    [
-        ("like: ideal\ncrosstalk: {widht: 3}\n", r"/base.yaml:2:13: unknown key 'widht'"),
-        ("like: ideal\ncrosstalk: {width: wide}\n", r"/base.yaml:2:20: crosstalk.width"),
-        ("like: plm-4bit\npanel: {bits: 5}\n", r"/base.yaml:\d+:\d+: .*16 entries; a panel of 5 bits has 32"),
-    ],
-)
-def test_a_fault_of_a_base_is_told_of_the_file_that_has_it(tmp_path, base, place):
-    (tmp_path / "base.yaml").write_text(base)
-    (tmp_path / "mine.yaml").write_text("like: base.yaml\nname: mine\n")
-    with pytest.raises(UserError, match=place):
         load_profile("mine.yaml", tmp_path)
 
 

@@ -22,14 +22,7 @@ from holobench_eval.methods.calibrated.parametric import ParametricModel
 from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.samples import Schedule
 from holobench_eval.methods.wirtinger import Wirtinger
-from tests.support.small_training import (
-    BentDisplay,
-    Memory,
-    pictures,
-    small_spec,
-    solving_bench,
-    training_bench,
-)
+from tests.support.small_training import BentDisplay, Memory, pictures, small_spec, solving_bench, training_bench
 
 SPEC = small_spec(32, 24, colours=3)
 SHORT: dict[str, Any] = {

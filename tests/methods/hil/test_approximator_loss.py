@@ -22,7 +22,7 @@ from holobench_eval.methods.hil.approximator_loss import (
     published_loss,
 )
 from holobench_eval.methods.hil.networks import Network
-from holobench_eval.methods.hil.trainer import Trainer, trainer
+from holobench_eval.methods.hil.trainer import Trainer
 
 TRAINED = ("proposed", "unet", "pix2pix", "pix2pixhd")
 
@@ -41,7 +41,7 @@ def _deterministic() -> Any:
 
 
 def small(name: Any = "proposed", loss: ApproximatorLoss | None = None, seed: int = 0, **params: Any) -> Trainer:
-    return trainer(Network(name, levels=2, width=4, **params), loss, 3, 3, seed)
+    return Trainer(Network(name, levels=2, width=4, **params), loss, 3, seed)
 
 
 def pair(number: int = 0, size: int = 40) -> tuple[Tensor, Tensor]:
@@ -66,7 +66,7 @@ def same(left: list[Tensor], right: list[Tensor]) -> bool:
 
 @pytest.mark.parametrize("name", TRAINED)
 def test_steps_lower_the_loss_of_every_network(name: str) -> None:
-    training = trainer(Network(name, levels=2, width=16), None, 3, 3, 0)
+    training = Trainer(Network(name, levels=2, width=16), None, 3, 0)
     losses = [training.step(*of_size(name))["l1"] for _ in range(40)]
     assert sum(losses[-5:]) < 0.8 * sum(losses[:5])
 
@@ -152,7 +152,7 @@ def test_each_optimiser_moves_its_own_network_by_at_most_the_published_rate() ->
 
 def test_the_generators_rate_falls_along_half_a_cosine_and_the_discriminators_stays() -> None:
     rates = LearningRates(generator=1e-3, decay=True)
-    training = trainer(Network(levels=2, width=4), None, 3, 3, 0, rates)
+    training = Trainer(Network(levels=2, width=4), None, 3, 0, rates)
 
     def step(progress: float) -> list[float]:
         before = weights(training)
@@ -210,7 +210,7 @@ def test_a_state_that_does_not_fit_is_refused_in_one_line() -> None:
     state: Any = training.state_dict()
     moments = copy.deepcopy(state)
     moments["optimisers"]["generator"][0]["exp_avg"] = torch.zeros(1)
-    other = trainer(Network(levels=3, width=4), None, 3, 3, 0).state_dict()
+    other = Trainer(Network(levels=3, width=4), None, 3, 0).state_dict()
     for wrong in ({}, other, moments, state | {"noise": torch.zeros(3)}, state | {"perceptual": "vgg19"}, [1, 2]):
         with pytest.raises(UserError, match="the saved training does not fit") as caught:
             small().load_state_dict(wrong)

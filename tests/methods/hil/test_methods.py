@@ -15,8 +15,7 @@ from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
 from holobench_eval.methods.hil.hil import HIL
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.hil.nh3d import HILNH3D
-from holobench_eval.methods.hil.start import SmoothStart
-from holobench_eval.methods.hil.tuned import HILTuned
+from holobench_eval.methods.hil.tuned import HILTuned, SmoothStart
 from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.retrieval import PhaseRetrieval
 from holobench_eval.methods.learned.samples import Schedule

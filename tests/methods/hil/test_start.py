@@ -10,7 +10,7 @@ from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.display.metered import MeteredDisplay
-from holobench_eval.methods.hil.start import SmoothStart
+from holobench_eval.methods.hil.tuned import SmoothStart
 from holobench_eval.methods.losses import intensity_l2
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.opening import open_bench

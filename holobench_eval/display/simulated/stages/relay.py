@@ -13,6 +13,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ....core.compiled import usable
+from ...resampling import picked
 from ..kernels import sample_rows
 from ..maps import enlarged
 from ..stage import Effect, Stage
@@ -117,17 +118,7 @@ def sample(image: Tensor, grid: Tensor, per_pixel: int) -> Tensor:
 
 
 def gathered(image: Tensor, grid: Tensor) -> Tensor:
-    """What ``grid_sample`` gives for an image ``(H, W)``, from pixels picked by index.
-
-    Its gradient is deterministic on a GPU, where that of ``grid_sample`` is not.
-    """
-    rows, columns = image.shape
-    x, y = (grid[..., 0] + 1) / 2 * (columns - 1), (grid[..., 1] + 1) / 2 * (rows - 1)
-    left, top = x.floor(), y.floor()
-    total = torch.zeros_like(x)
-    for row, column in ((top, left), (top, left + 1), (top + 1, left), (top + 1, left + 1)):
-        inside = (row >= 0) & (row <= rows - 1) & (column >= 0) & (column <= columns - 1)
-        weight = (1 - (y - row).abs()) * (1 - (x - column).abs()) * inside
-        pixels = image[row.clamp(0, rows - 1).long(), column.clamp(0, columns - 1).long()]
-        total = total + weight * pixels
-    return total
+    """What ``grid_sample`` gives for an image ``(H, W)``, see ``picked``."""
+    x, y = ((grid[..., axis] + 1) / 2 * (image.shape[1 - axis] - 1) for axis in (0, 1))
+    rows, columns = ([(at.floor() + k, 1 - (at - (at.floor() + k)).abs()) for k in (0, 1)] for at in (y, x))
+    return picked(image, rows, columns)

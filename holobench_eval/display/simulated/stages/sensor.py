@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812
 from annotated_types import Interval
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from ....core.compiled import usable
 from ....core.units import Metres
 from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
+from ....optics.linear import linear
 from ..geometry import Geometry
 from ..kernels import Plane, box_back_rows, box_rows, count_rows, counts
 from ..maps import enlarged
@@ -172,25 +173,13 @@ def box_filter(image: Tensor, width: float) -> Tensor:
     edge = (width - (2 * reach - 1)) / 2
     taps = [share / width for share in (edge, *[1.0] * (2 * reach - 1), edge)]
     if usable(image.detach()) and image.ndim == 2 and image.dtype == torch.float32:
-        filtered: Tensor = _Box.apply(image, np.array(taps, np.float32))  # type: ignore[no-untyped-call]
-        return filtered
+        weights = np.array(taps, np.float32)
+        return linear(partial(_filtered, box_rows, weights), partial(_filtered, box_back_rows, weights), image)
     flat = F.pad(image.reshape(-1, 1, *image.shape[-2:]), (reach, reach, reach, reach), mode="replicate")
     return correlate(correlate(flat, taps, dim=-2), taps, dim=-1).reshape(image.shape)
 
 
-class _Box(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, image: Tensor, taps: Plane) -> Tensor:
-        ctx.taps = taps
-        return _filtered(box_rows, image, taps)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
-        return _filtered(box_back_rows, grad, ctx.taps), None
-
-
-def _filtered(filtering: Callable[[Plane, Plane, int, int, Plane], None], image: Tensor, taps: Plane) -> Tensor:
+def _filtered(filtering: Callable[[Plane, Plane, int, int, Plane], None], taps: Plane, image: Tensor) -> Tensor:
     given, result = image.detach().contiguous().numpy(), torch.empty(image.shape, dtype=image.dtype, device="cpu")
     in_blocks(
         lambda rows: filtering(given, taps, rows.start, rows.stop, result.numpy()), result, len(image), image.numel()

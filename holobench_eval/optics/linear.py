@@ -1,0 +1,30 @@
+"""Linear maps whose adjoint is written out, where autograd would take longer or more memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+Map = Callable[[Tensor], Tensor]
+
+
+def linear(forward: Map, adjoint: Map, values: Tensor) -> Tensor:
+    """``forward`` of values, whose gradient is ``adjoint`` of that of the result; differentiable once."""
+    result: Tensor = _Linear.apply(values, forward, adjoint)  # type: ignore[no-untyped-call]
+    return result
+
+
+class _Linear(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, forward: Map, adjoint: Map) -> Tensor:
+        ctx.adjoint = adjoint
+        return forward(values)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
+        return ctx.adjoint(grad), None, None
