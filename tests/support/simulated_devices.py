@@ -245,8 +245,9 @@ class Nothing:
 
 def connect(slm: SimulatedSlm, camera: SimulatedCamera, put: Callable[[Any, str, Any], None] = setattr) -> None:
     """Put the devices behind the names that `BENCH` has. put: sets an attribute, such as pytest's for a test."""
-    for name, device in (("SLM_DRIVERS", slm), ("CAMERA_DRIVERS", camera)):
-        known = next(iter(getattr(catalogue, name).values()))
-        driver = replace(known, settings=Nothing, opens=lambda _, device=device: device)
-        put(catalogue, name, {"simulated": driver})
+    drivers = {}
+    for kind, device in (("slm", slm), ("camera", camera)):
+        known = next(iter(catalogue.DRIVERS[kind].values()))
+        drivers[kind] = {"simulated": replace(known, settings=Nothing, opens=lambda _, device=device: device)}
+    put(catalogue, "DRIVERS", drivers)
     put(SwitchedLaser, "select", lambda _, channel: slm.scene.select(channel))

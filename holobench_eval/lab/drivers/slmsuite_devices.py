@@ -172,25 +172,19 @@ def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
         raise UserError(f"device '{device}' cannot be built with these arguments: {line(error)}") from error
 
 
-DRIVERS = (
+DRIVERS = tuple(
     Driver(
-        "slm",
+        kind,
         "slmsuite",
         SlmsuiteSettings,
-        SlmsuiteSlm,
+        cls,
         "slmsuite",
         "slmsuite",
-        lambda: classes("slms") and [],
-        "slmsuite does not look for panels: give the class of yours as device, such as holoeye.Holoeye",
-    ),
-    Driver(
-        "camera",
-        "slmsuite",
-        SlmsuiteSettings,
-        SlmsuiteCamera,
-        "slmsuite",
-        "slmsuite",
-        lambda: classes("cameras") and [],
-        "slmsuite does not look for cameras: give the class of yours as device, such as thorlabs.ThorCam",
-    ),
+        lambda hardware=hardware: classes(hardware) and [],
+        f"slmsuite does not look for {words}: give the class of yours as device, such as {example}",
+    )
+    for kind, hardware, cls, words, example in (
+        ("slm", "slms", SlmsuiteSlm, "panels", "holoeye.Holoeye"),
+        ("camera", "cameras", SlmsuiteCamera, "cameras", "thorlabs.ThorCam"),
+    )
 )

@@ -10,7 +10,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.drivers.catalogue import open_camera
+from holobench_eval.lab.drivers.catalogue import open_device
 from holobench_eval.lab.drivers.gphoto2_camera import Gphoto2Camera, Gphoto2Settings, list_cameras
 
 MOSAIC = np.random.default_rng(4).integers(0, 16383, (64, 96), dtype=np.uint16)
@@ -38,7 +38,7 @@ def raw(card: Callable[[bytes], None], bayer_dng: Callable[..., bytes]) -> bytes
 
 
 def test_counts_of_the_photosites_arrive_at_the_nearest_speed_whose_time_is_told(raw: bytes) -> None:
-    camera = open_camera("gphoto2", {"model": MODEL})
+    camera = open_device("camera", "gphoto2", {"model": MODEL})
     try:
         assert camera.name.startswith(MODEL)
         assert camera.white == 16383
