@@ -9,7 +9,7 @@ import pytest
 STEPS = """
 import ctypes, resource
 import numpy as np
-from holobench_eval.core.allocator import keep_freed_memory
+from holobench_eval.core.device import keep_freed_memory
 
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt

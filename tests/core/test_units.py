@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holobench_eval.core.units import Metres, metres
+from holobench_eval.core.schema import Metres, metres
 
 
 @pytest.mark.parametrize(

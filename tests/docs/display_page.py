@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from holobench_eval.core.json_schema import json_schemas, resolved
+from holobench_eval.core.parameters import json_schemas, resolved
 from holobench_eval.display.simulated.maps import KEYS
 from holobench_eval.display.simulated.profile import STAGES, Profile
 from tests.docs.sections import introduction, mappings, section

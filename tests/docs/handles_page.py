@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from holobench_eval.core.json_schema import meanings
+from holobench_eval.core.parameters import meanings
 from holobench_eval.display.api import DisplaySpec
 from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.training import TrainingBench

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from holobench_eval.core.json_schema import resolved
-from holobench_eval.core.parameters import allowed
+from holobench_eval.core.parameters import allowed, resolved
 
 LONGEST = 5  # names that a cell lists; of more, holoeval list has them
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 from ....core.compiled import usable
-from ....core.units import Metres
+from ....core.schema import Metres
 from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
 from ..geometry import Geometry
