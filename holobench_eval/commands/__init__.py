@@ -44,10 +44,10 @@ COMMANDS = {
         "twin",
     ),
     "Your own methods and displays, and this program": (
-        "new_method",
-        "new_display",
-        "conformance",
-        "calibrate",
+        "own.new_method",
+        "own.new_display",
+        "own.conformance",
+        "own.calibrate",
     ),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from holobench_eval.commands.calibrate import calibrate
+from holobench_eval.commands.own.calibrate import calibrate
 from holobench_eval.study.calibration.fitting import Fitting
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import UserError, listed
-from ...core.panels import is_small
 from ..options import thread_count
-from . import committed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,25 +64,6 @@ class Verdict:
             f"{self.cells} cells computed again: {self.reproduced} numbers reproduced, {self.close} within tolerance "
             f"({TOLERANCE_DB:g} dB; {TOLERANCE:g} for other scores), {len(self.faults)} not"
         )
-
-
-def rerun_in(folder: Path, count: int, seed: int, artifacts: Path, write: Callable[[str], None]) -> list[str]:
-    """Rerun ``count`` cells of each of ``committed.reports_in``; write what was found, and return a line a fault."""
-    from ...study.executors import executor
-
-    faults = []
-    for report in committed.reports_in(folder):
-        try:
-            study, _ = committed.read(report)
-            where = executor("auto", None, is_small(study.display.panel))
-            verdict = rerun(report, study, count, seed, artifacts, where)
-        except (UserError, OSError) as error:
-            write(f"{report}: not rerun: {error}")
-            continue
-        for line in (str(verdict), *verdict.notes):
-            write(f"{report}: {line}")
-        faults += [" ".join(f"{report}: {fault}".split()) for fault in verdict.faults]
-    return faults
 
 
 def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, where: Executor) -> Verdict:
