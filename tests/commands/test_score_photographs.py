@@ -21,7 +21,7 @@ from holobench_eval.metrics import score
 from holobench_eval.optics.colour import srgb_decode, srgb_encode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
-from tests.support.photographed import captured, drowned, photograph, pose, save
+from tests.support.photographed import captured, drowned, few, photograph, pose, save
 from tests.support.reports import whole
 
 SHAPE = (160, 200)
@@ -33,10 +33,6 @@ LASERS = np.array([1.0, 0.9, 0.8], np.float32)[:, None, None]
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Only the two metrics that are quick."""
-
-    def few(*pictures: Any, **options: Any) -> dict[str, float]:
-        return score(*pictures, **{**options, "metrics": ("psnr", "ssim")})
-
     monkeypatch.setattr(scored_pictures, "score", few)
 
 
@@ -91,8 +87,8 @@ def test_a_cut_capture_names_the_side_and_with_visible_its_part_is_scored_and_it
 
 def test_visible_changes_no_score_of_captures_that_show_all(tmp_path):
     root = cut_off(tmp_path, a=0, b=0)
-    _, _, before = run(root)
-    _, _, after = run(root, visible=True)
+    (_, said, before), (_, _, after) = run(root), run(root, visible=True)
+    assert said.startswith("--values stored: ")
     assert after[KEY].to_dict() == before[KEY].to_dict()
     assert (after["share_scored"] == 1).all()
 

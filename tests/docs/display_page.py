@@ -11,8 +11,6 @@ from tests.docs.sections import introduction, mappings, section
 
 PAGE = Path(__file__).parents[2] / "docs" / "displays.md"
 
-MARK = "<!-- What follows is written by: python -m tests.docs.display_page -->\n"
-
 
 def page() -> str:
     """The text of the page: what stands above the mark, and the tables."""
@@ -21,7 +19,7 @@ def page() -> str:
     for name, stage in STAGES.items():
         if name in schema["properties"] and name != "panel":
             schema["properties"][name]["description"] = stage.title
-    parts = [introduction(PAGE, MARK), *section("The document", schema, definitions, units=True)]
+    parts = [introduction(PAGE, "display_page"), *section("The document", schema, definitions, units=True)]
     for key, entry in schema["properties"].items():
         for name, inner in mappings(key, entry, definitions):
             parts += section(f"`{name}`", inner, definitions, _note(key), units=True)

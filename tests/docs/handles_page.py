@@ -15,7 +15,6 @@ from tests.docs.sections import introduction
 
 PAGE = Path(__file__).parents[2] / "docs" / "handles.md"
 
-MARK = "<!-- What follows is written by: python -m tests.docs.handles_page -->\n"
 HANDLES = (
     ("In `solve`: a `MeteredDisplay`", "bench", MeteredDisplay),
     ("In `prepare`: a `TrainingBench`", "bench", TrainingBench),
@@ -26,7 +25,7 @@ OWN = {"simulation", "seed", "known", "journal"}  # what the harness and the ora
 
 def page() -> str:
     """The text of the page: what stands above the mark, and a table a handle and one of the optics."""
-    parts = [introduction(PAGE, MARK)]
+    parts = [introduction(PAGE, "handles_page")]
     for title, name, cls in HANDLES:
         fields = [f"| `{name}.{field}` | {_text(text)} |" for field, text in meanings(cls).items() if field not in OWN]
         parts.append("\n".join([f"## {title}\n", "| | |", "|---|---|", *fields, *_members(name, cls), ""]))

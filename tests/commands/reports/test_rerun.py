@@ -20,7 +20,7 @@ from holobench_eval.study.run import Outcome
 from tests.commands.test_commands import holoeval
 from tests.study.test_run import compute
 from tests.support import trained_study
-from tests.support.fake_study import FAKES, solves, write_config
+from tests.support.fake_study import installed, solves, write_config
 
 ALL = 1000
 TWO = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: other, params: {value: 5}}')
@@ -60,9 +60,7 @@ class Committed:
 def committed(folder: Path, *methods: str) -> Committed:
     write_config(folder, methods, count=2)
     made = Committed(folder)
-    with pytest.MonkeyPatch.context() as patch:
-        for module, name, fake in FAKES:
-            patch.setattr(module, name, fake)
+    with installed():
         made.commit(compute(made.config, made.report))
     return made
 

@@ -14,14 +14,8 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.session import read_manifest
 from tests.lab.session.running import told
+from tests.study.studies import write_study
 
-STUDY = """\
-title: Patterns
-display: {bench: bench.yaml}
-targets: {dataset: charts, params: {names: [tv_lines]}}
-methods: [double_phase]
-protocol: {metrics: [psnr]}
-"""
 BENCH = """\
 name: corrected
 version: 1
@@ -32,10 +26,11 @@ FLAT = np.random.default_rng(0).integers(0, 256, (96, 96)).astype(np.uint8)
 
 
 def exported(folder: Path, bench: str, session: str = "session") -> tuple[Path, str]:
-    (folder / "study.yaml").write_text(STUDY)
+    targets = "{dataset: charts, params: {names: [tv_lines]}}"
+    config = write_study(folder / "study.yaml", "double_phase", display="{bench: bench.yaml}", targets=targets)
     (folder / "bench.yaml").write_text(bench)
     cv2.imwrite(str(folder / "flat.bmp"), FLAT)
-    return folder / session, " ".join(told("export", folder / "study.yaml", folder / session))
+    return folder / session, " ".join(told("export", config, folder / session))
 
 
 def test_patterns_have_a_full_turn_for_each_laser_and_the_map_that_travels_with_them(tmp_path: Path) -> None:
