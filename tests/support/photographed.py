@@ -13,7 +13,7 @@ from PIL import Image
 from skimage import data
 
 from holobench_eval.metrics import score
-from holobench_eval.testing.grid_poses import corner_points
+from holobench_eval.testing.grid_poses import corner_points as corners
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -57,7 +57,7 @@ def pose(
     lean = np.eye(3)
     lean[2, :2] = draw.uniform(-perspective, perspective, 2) / max(shape)
     place = np.diag([scale, scale, 1.0]) @ lean @ turn @ mirror @ centre
-    ends = mapped(place, corner_points(shape))
+    ends = mapped(place, corners(shape))
     low, high = ends.min(axis=0), ends.max(axis=0)
     size = np.ceil((high - low) * room).astype(int)
     shift = np.eye(3)
