@@ -31,18 +31,8 @@ COMMANDS = {
         "show",
         "schema",
     ),
-    "Finished reports": (
-        "reports.figure",
-        "reports.check",
-        "reports.compare",
-        "reports.site",
-    ),
-    "Pictures and real displays": (
-        "doctor",
-        "score",
-        "session",
-        "twin",
-    ),
+    "Finished reports": ("reports.figure", "reports.check", "reports.compare", "reports.site"),
+    "Pictures and real displays": ("doctor", "score", "session", "twin"),
     "Your own methods and displays, and this program": (
         "own.new_method",
         "own.new_display",

@@ -34,6 +34,7 @@ def check_method(method: Any) -> None:
     captures only with ``camera = True``. One that learns is prepared first, with three smooth images.
     """
     cls = method if isinstance(method, type) else type(method)
+    assert is_dataclass(cls), f"{cls.__name__} is not a dataclass; write @dataclass(frozen=True) above it"
     instance = _default(cls) if isinstance(method, type) else method
     _check_parameters(cls, instance)
     try:
@@ -50,7 +51,6 @@ def check_method(method: Any) -> None:
 
 
 def _default(cls: type[Any]) -> Any:
-    assert is_dataclass(cls), f"{cls.__name__} is not a dataclass; write @dataclass(frozen=True) above it"
     try:
         return cls()
     except TypeError as error:
@@ -59,7 +59,6 @@ def _default(cls: type[Any]) -> Any:
 
 def _check_parameters(cls: type[Any], instance: Any) -> None:
     name = cls.__name__
-    assert is_dataclass(cls), f"{name} is not a dataclass; write @dataclass(frozen=True) above it"
     for item in fields(cls):
         try:
             setattr(instance, item.name, getattr(instance, item.name))

@@ -255,14 +255,8 @@ def _judge(
             was, now = (sha256[:12] or "nothing" for sha256 in learned)
             verdict.faults.append(f"{each}: learned state was {was}, is {now}: another artifact")
         for name in scores:
-            if name not in lacking and _is_judged(each.cell, name):
+            if name not in lacking and not name.startswith(MATCHES):
                 _judge_number(each, name, row, verdict)
-
-
-def _is_judged(cell: Cell, name: str) -> bool:
-    from ...report.data.scores import parse
-
-    return not (name.startswith(MATCHES) or (cell.method in FLAT and parse(name).metric in OF_EDGES))
 
 
 def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Verdict) -> None:
@@ -271,7 +265,7 @@ def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Ver
 
     score = parse(name)
     then, now = float(each.row[name]), float(row.get(name, math.nan))
-    if math.isnan(then):
+    if math.isnan(then) or (each.cell.method in FLAT and score.metric in OF_EDGES):
         return
     if rounded(then) == rounded(now):
         verdict.reproduced += 1
