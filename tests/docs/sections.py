@@ -43,25 +43,16 @@ def section(title: str, schema: Any, definitions: Any, note: str = "", units: bo
     for name, entry in schema["properties"].items():
         inside = any(True for _ in mappings(name, entry, definitions))
         default = "needed" if name in needed else "below" if inside and entry.get("default") else _default(entry)
-        words = _words(entry, definitions)
-        text = entry["description"]
+        text = entry["description"].replace("None: ", "null: ").replace("|", "\\|")
         unit = re.search(r" ?\[([^\]]+)\]", text) if units else None
         text = text.replace(unit[0], "", 1).strip() if unit else text
-        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, words, default, _text(text)]
+        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, allowed(_short(entry), definitions), default, text]
         yield f"| {' | '.join(cells)} |".replace("  ", " ")
     yield ""
 
 
 def _default(entry: Any) -> str:
     return f"`{json.dumps(entry['default'])}`" if entry.get("default", "") not in ("", [], {}) else ""
-
-
-def _words(entry: Any, definitions: Any) -> str:
-    return allowed(_short(entry), definitions)
-
-
-def _text(text: str) -> str:
-    return text.replace("None: ", "null: ").replace("|", "\\|")
 
 
 def _short(entry: Any) -> Any:

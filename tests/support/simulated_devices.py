@@ -182,7 +182,7 @@ class SimulatedCamera:
     noise: float = 0.0
     colour: bool = False
     deaf: bool = False
-    limits: tuple[float, float] = (1e-5, 10.0)
+    exposures: tuple[float, float] = (1e-5, 10.0)
     failures: int = 0
     frames: int = 0
     name: str = "simulated camera"
@@ -195,16 +195,12 @@ class SimulatedCamera:
     def white(self) -> float:
         return 2.0**self.bits - 1
 
-    @property
-    def exposures(self) -> tuple[float, float]:
-        return self.limits
-
     def expose(self, seconds: float) -> tuple[Counts, float]:
         if self.failures:
             self.failures -= 1
             raise DeviceError("simulated camera: no frame within 1 s")
         self.frames += 1
-        seconds = min(max(seconds, self.limits[0]), self.limits[1])
+        seconds = min(max(seconds, self.exposures[0]), self.exposures[1])
         counts = self._counts(self.scene.light(), 0.01 if self.deaf else seconds)
         self.scene.clock.wait(seconds)
         if not self.colour:

@@ -60,10 +60,7 @@ def test_patterns_have_a_full_turn_for_each_laser_and_the_map_that_travels_with_
         ("{two_pi_level: [311, 256]}", "bench.yaml:4:8: phase: two_pi_level: 2 levels for 3 colours"),
         ("{two_pi_level: [311, 0, 256]}", "bench.yaml:4:29: phase.two_pi_level[1]: 0 is no level of a full turn"),
         ("{two_pi_level: [2.1, 1.9, 1.7]}", "two_pi_level[0]: 2.1 is no level of a full turn; expected 8 to 65536"),
-        (
-            "{correction: {file: flat.bmp, two_pi_level: 8}}",
-            "levels from 0 to 255, which are 32 turns; set correction.two_pi_level to the level of this uint8 map",
-        ),
+        ("{correction: {file: flat.bmp, two_pi_level: 8}}", "levels from 0 to 255, which are 32 turns; set correction"),
         ("{correction: {file: gone.bmp}}", "gone.bmp: no such file"),
         ("{correction: {file: ../up.bmp}}", "does not travel with a session; put it beside this file"),
     ],
