@@ -1,7 +1,5 @@
 """From Python: the same numbers as a study, with NumPy on both sides."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import sys

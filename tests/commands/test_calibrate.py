@@ -1,7 +1,5 @@
 """The command prints what was fitted, what it gives and what was wanted."""
 
-from __future__ import annotations
-
 import pytest
 
 from holobench_eval.commands.own.calibrate import calibrate

@@ -1,7 +1,5 @@
 """What ``holoeval list`` says of a single name."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """A session folder is exported in one place and imported in another, with nothing left where it came from."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

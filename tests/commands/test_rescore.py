@@ -1,7 +1,5 @@
 """``holoeval rescore`` and ``check`` with a metric that came, or changed, after a study was run."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

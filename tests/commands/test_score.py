@@ -1,7 +1,5 @@
 """``holoeval score``: pictures in, the report of a study out, and one clear line for everything that is wrong."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

@@ -1,7 +1,5 @@
 """What ``holoeval score`` and its report say of methods that lack targets, and of how to rank them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

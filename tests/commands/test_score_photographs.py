@@ -1,7 +1,5 @@
 """``holoeval score`` on photographs as laboratories have them: one laser, too dark, cut off, speckled, aligned."""
 
-from __future__ import annotations
-
 import io
 import re
 import shutil

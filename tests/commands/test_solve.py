@@ -1,7 +1,5 @@
 """One picture is solved by one command, whose study can be run again."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

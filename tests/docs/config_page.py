@@ -1,7 +1,5 @@
 """``docs/config.md`` from the schema of configs: ``python -m tests.docs.config_page`` writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from holobench_eval.commands.schema import study_schema

@@ -1,7 +1,5 @@
 """``docs/displays.md`` from the schema of displays: ``python -m tests.docs.display_page`` writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from holobench_eval.core.parameters import json_schemas, resolved

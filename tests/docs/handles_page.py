@@ -1,7 +1,5 @@
 """``docs/handles.md`` from docstrings: ``python -m tests.docs.handles_page`` writes it."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Keys of a file as a table each mapping, from the JSON schema that checks it."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

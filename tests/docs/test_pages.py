@@ -1,7 +1,5 @@
 """Pages and tables of the documentation are what the code and the committed reports say."""
 
-from __future__ import annotations
-
 import re
 from types import ModuleType
 

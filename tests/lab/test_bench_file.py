@@ -1,7 +1,5 @@
 """What a bench that exists cannot be is refused at its line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Made-up photographs of a display: a picture through a known homography, with speckle, vignetting and noise."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

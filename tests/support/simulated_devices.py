@@ -1,7 +1,5 @@
 """A panel, its lasers and a camera around the simulated bench, on a clock of their own that nobody has to wait for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

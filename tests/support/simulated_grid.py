@@ -1,7 +1,5 @@
 """Captures with a known warp: a picture as a hologram shows it, speckled, on a sensor of its own pitch and pose."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

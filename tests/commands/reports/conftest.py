@@ -1,7 +1,5 @@
 """A finished report, computed once without physics, that tests copy and spoil."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

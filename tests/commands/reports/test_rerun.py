@@ -1,7 +1,5 @@
 """``holoeval check --rerun``: what of a committed report is reproduced, and what is found that is not."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections import Counter

@@ -1,7 +1,5 @@
 """The checks of a live bench, made on the photographs of a session: one line each, and no score where one fails."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Frames of one exposure through the files of a session: several patterns, one photograph, the score of the display."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a session's patterns hold on a panel with a correction map and three lasers, here and where the folder goes."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The same photographs give the same number, whether a session imports them or ``holoeval score`` reads them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

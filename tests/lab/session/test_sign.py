@@ -1,7 +1,5 @@
 """A panel whose phase has the other sign than stated is named where no fiducial grid is found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

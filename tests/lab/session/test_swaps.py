@@ -1,7 +1,5 @@
 """Photographs of one target that changed places are found by the grain of each hologram, or said to be too alike."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path
