@@ -47,7 +47,8 @@ def check_method(method: Any) -> None:
     fewest = 3 if photographs else 1  # a capture is of all colours of the display
     _check_solution(instance, bench, _target(bench, images=1, channels=3), learned)
     _check_solution(instance, bench, _target(bench, images=2, channels=fewest), learned)
-    _check_repeatable(instance, bench, _target(bench, images=2, channels=fewest), learned)
+    again = [_solve(instance, bench, _target(bench, images=2, channels=fewest), learned)[0] for _ in range(2)]
+    assert torch.equal(*again), f"{cls.__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
 def _default(cls: type[Any]) -> Any:
@@ -119,11 +120,6 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, learned
     assert torch.equal(target, before), f"{name}.solve changed its target; clone it first"
     declared = traits_of(method).camera or handle.captures == 0
     assert declared, f"{name} captures, but declares no camera; set camera = True"
-
-
-def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor, learned: Mapping[str, Any] | None) -> None:
-    (first, _), (again, _) = (_solve(method, bench, target, learned) for _ in range(2))
-    assert torch.equal(first, again), f"{type(method).__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
 def _solve(
