@@ -21,41 +21,6 @@ SMALLEST = 32  # shortest side [px] that a chart can be drawn on; all details ar
 SAMPLES = 6  # samples a pixel and axis where the covered area of a pixel has no simple closed form
 
 
-@dataclass(frozen=True)
-class Charts:
-    """Charts of lines, bars, spokes, gray levels, squares and circles, for resolution, tone and geometry.
-
-    Charts are gray, in linear light from 0 to 1, the same in every channel. They are drawn for the shape asked for, not
-    resized: circles stay circles and the finest lines stay one pixel wide. Edges within a pixel give the mean over its
-    area.
-
-    names: which, in which order; all by default.
-    """
-
-    names: tuple[str, ...] = ("tv_lines", "siemens_star", "usaf_bars", "gray_ramp", "checkerboard", "circle_grid")
-
-    training: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        """UserError for an unknown or repeated name."""
-        chosen("chart", self.names, tuple(CHARTS))
-
-    def items(self) -> list[str]:
-        """The names, in order."""
-        return list(self.names)
-
-    def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
-        """A chart as ``(channels, *shape)`` linear light in [0, 1]; UserError for a shape below 32 px."""
-        draw = CHARTS[known("chart", item, self.names)]
-        if min(shape) < SMALLEST:
-            raise UserError(f"chart '{item}' needs {SMALLEST} px or more in both directions, not {shape}")
-        return with_channels(draw(*shape).clamp(0.0, 1.0).float().repeat(3, 1, 1), channels)
-
-    def digest(self, item: str) -> str:
-        """SHA-256 of the chart's name and the version of the drawings."""
-        return named_digest("chart", VERSION, known("chart", item, self.names))
-
-
 def tv_lines(rows: int, columns: int) -> Tensor:
     """Patches of vertical and of horizontal lines, six line widths from one pixel to a thirtieth of the short side.
 
@@ -156,13 +121,43 @@ def circle_grid(rows: int, columns: int) -> Tensor:
 
 
 CHARTS: dict[str, Callable[[int, int], Tensor]] = {
-    "tv_lines": tv_lines,
-    "siemens_star": siemens_star,
-    "usaf_bars": usaf_bars,
-    "gray_ramp": gray_ramp,
-    "checkerboard": checkerboard,
-    "circle_grid": circle_grid,
+    draw.__name__: draw for draw in (tv_lines, siemens_star, usaf_bars, gray_ramp, checkerboard, circle_grid)
 }
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Charts of lines, bars, spokes, gray levels, squares and circles, for resolution, tone and geometry.
+
+    Charts are gray, in linear light from 0 to 1, the same in every channel. They are drawn for the shape asked for, not
+    resized: circles stay circles and the finest lines stay one pixel wide. Edges within a pixel give the mean over its
+    area.
+
+    names: which, in which order; all by default.
+    """
+
+    names: tuple[str, ...] = tuple(CHARTS)
+
+    training: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        """UserError for an unknown or repeated name."""
+        chosen("chart", self.names, tuple(CHARTS))
+
+    def items(self) -> list[str]:
+        """The names, in order."""
+        return list(self.names)
+
+    def load(self, item: str, shape: tuple[int, int], channels: int = 3) -> Tensor:
+        """A chart as ``(channels, *shape)`` linear light in [0, 1]; UserError for a shape below 32 px."""
+        draw = CHARTS[known("chart", item, self.names)]
+        if min(shape) < SMALLEST:
+            raise UserError(f"chart '{item}' needs {SMALLEST} px or more in both directions, not {shape}")
+        return with_channels(draw(*shape).clamp(0.0, 1.0).float().repeat(3, 1, 1), channels)
+
+    def digest(self, item: str) -> str:
+        """SHA-256 of the chart's name and the version of the drawings."""
+        return named_digest("chart", VERSION, known("chart", item, self.names))
 
 
 def _line_widths(widest: float, count: int) -> list[int]:

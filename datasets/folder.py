@@ -13,6 +13,7 @@ from annotated_types import Interval, MinLen
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
+from ..core.files import read_text
 from ..core.hashing import State, file_state
 from .base import fit, looked_from, with_channels
 from .images import RIGHT, SUFFIXES, GrayImageError, SixteenBit, decode, read
@@ -157,19 +158,11 @@ def _checked(path: Path, _state: State | None, gray: bool, sixteen_bit: SixteenB
 @lru_cache(maxsize=16)
 def _manifest(path: Path, _state: State | None) -> dict[str, str]:
     """Name and sum of every line; UserError for a line of another form and for a path that leaves its folder."""
-    if path.stat().st_size > LARGEST_MANIFEST:
-        raise UserError(f"{path}: larger than {LARGEST_MANIFEST // 10**6} MB; that is no manifest")
-    try:
-        lines = path.read_text(encoding="utf-8").split("\n")
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: not UTF-8 text (byte {error.start}); expected lines as of sha256sum") from error
     sums: dict[str, str] = {}
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_text(path, LARGEST_MANIFEST).split("\n"), start=1):
         if not line.strip():
             continue
-        parts = _MANIFEST_LINE.fullmatch(line.rstrip("\r"))
+        parts = _MANIFEST_LINE.fullmatch(line)
         if parts is None:
             raise UserError(
                 f"{path}:{number}: not a line of sha256sum; expected 64 hexadecimal digits, two spaces, a path"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ..core.errors import PictureError, UserError
+from ..core.files import read_regular
 from ..core.pictures import Stored, open_picture
 from .base import from_srgb, planes
 
@@ -40,13 +41,9 @@ def read(path: Path) -> bytes:
     if not path.is_file():
         raise UserError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}; {RIGHT}")
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
+        return read_regular(path, LARGEST_BYTES)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(content) > LARGEST_BYTES:
-        raise UserError(f"{path}: larger than {LARGEST_BYTES // 10**6} MB; {RIGHT}")
-    return content
 
 
 def decode(content: bytes, name: str, gray: bool = False, sixteen_bit: SixteenBit = "refuse") -> Tensor:

@@ -8,14 +8,11 @@ from typing import Protocol
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from ..core.seeds import generator
 from ..optics import srgb_decode
+from .seeded import Array, Seeded
 
 VERSION = 1  # part of every digest: raise it when the scene is drawn differently
-
-Array = NDArray[np.float64]
 
 # height of the floor and distance of the wall, with the eye at the origin, y upwards and z away from it
 FLOOR, WALL = -1.0, 9.0
@@ -159,14 +156,11 @@ def _lit(normal: Array, colour: Array, points: Array, casting: Sequence[Surface]
 
 def _surfaces(name: str) -> list[Surface]:
     """Wall and floor, then balls and pillars beside one another, each in one of the bands of depth."""
-    draw = generator("still life", name)
-
-    def number(low: float, high: float) -> float:
-        return low + (high - low) * float(torch.rand((), generator=draw, dtype=torch.float64))
+    draw = Seeded("still life", name)
 
     def colours(strong: float) -> tuple[Array, Array]:
         """A dark and a light colour of one hue, drawn in sRGB."""
-        hue = torch.rand(3, generator=draw, dtype=torch.float64)
+        hue = torch.from_numpy(draw.numbers(3))
         hue = (hue - hue.min()) / (hue.max() - hue.min())
         hue = 1 - strong * (1 - hue)
         return srgb_decode(0.25 * hue).numpy(), srgb_decode(0.45 + 0.5 * hue).numpy()
@@ -176,13 +170,13 @@ def _surfaces(name: str) -> list[Surface]:
         Plane(1, FLOOR, Pattern("checks", colours(0.3), 0.4)),
     ]
     stands = zip((0, 2, 1, 0, 2, 1), ("dots", "stripes", "checks", "stripes", "dots", "checks"), strict=True)
-    side = 1 if number(0, 1) < 0.5 else -1
+    side = draw.side()
     for index, (band, kind) in enumerate(stands):
-        z = number(*BANDS[band])
+        z = draw.number(*BANDS[band])
         upright = kind == "checks"
-        radius = number(0.08, 0.11) * z * (0.6 if upright else 1.0)
-        x = side * (0.118 * (index - 2.5) + number(-0.02, 0.02)) * z
-        top = number(-0.06, 0.0) * z if upright else FLOOR + radius
-        pattern = Pattern(kind, colours(0.9), number(0.025, 0.05) * z)
+        radius = draw.number(0.08, 0.11) * z * (0.6 if upright else 1.0)
+        x = side * (0.118 * (index - 2.5) + draw.number(-0.02, 0.02)) * z
+        top = draw.number(-0.06, 0.0) * z if upright else FLOOR + radius
+        pattern = Pattern(kind, colours(0.9), draw.number(0.025, 0.05) * z)
         surfaces.append(Round(np.array([x, top, z]), radius, upright, pattern))
     return surfaces

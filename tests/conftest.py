@@ -63,8 +63,7 @@ def stage_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def no_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_physics() -> Iterator[None]:
     """Tasks meet the fake display and the fake score."""
-    for module, name, _ in fake_study.FAKES:
-        monkeypatch.setattr(module, name, getattr(module, name))  # put back after the test
-    fake_study.install()
+    with fake_study.installed():
+        yield

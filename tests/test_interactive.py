@@ -1,7 +1,5 @@
 """From Python: the same numbers as a study, with NumPy on both sides."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import sys
@@ -221,7 +219,6 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: d.target(np.full((50, 50), np.nan)), "linear light in .*; .* float64 with values from nan"),
         (lambda d, t: d.target(np.ones((50, 50), int)), "linear light in .*; this one is of int64"),
         (lambda d, t: d.target([[0.1], [0.1, 0.2]]), "a picture whose rows differ in length"),
-        (lambda d, t: d.target(np.full((50, 50), 2.0)), r"linear light in \[0, 1\]"),
         (lambda d, t: d.target("gone.png"), "gone.png: no such file"),
         (lambda d, t: d.target("a\0.png"), "a picture: .* is no path, since it holds a zero byte"),
         (lambda d, t: d.target(np.ma.masked_less(np.ones((50, 50)), 2)), "a picture with a mask"),
@@ -231,9 +228,7 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: d.solve(Flat(), t, level=1.0), "has its parameters already"),
         (lambda d, t: d.solve("wirtinger", t[:, 1:]), "as OpenDisplay.target gives it"),
         (lambda d, t: d.solve(lambda *_: 3, t), r"solve returned int, not a phase \(1, 3, 128, 128\)"),
-        (lambda d, t: d.solve(lambda *_: np.ones(PHASE, int), t), "returned ndarray of int64, not"),
         (lambda d, t: d.solve(lambda *_: torch.full(PHASE, torch.nan), t), "NaN or infinite"),
-        (lambda d, t: d.solve(lambda *_: np.full(PHASE, 1e300), t), "NaN or infinite"),
         (lambda d, t: d.solve(lambda *_: torch.arange(3.0 * 128**2).view(PHASE), t), "up to 49151: levels; expected"),
         (lambda d, t: d.solve(lambda *_: sys.exit("enough"), t), "SystemExit: enough"),
         (lambda d, t: d.solve(lambda target: 3, t), r"lambda>\(target\) cannot be called with target, bench"),
@@ -243,7 +238,6 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: d.solve(int, t), "class 'int' is not a dataclass with a method 'solve'"),
         (lambda d, t: d.solve(3, t), "a method of type 'int'; expected a name"),
         (lambda d, t: d.solve("wirtinger", t * np.nan), r"a target with values from nan to nan; .* in \[0, 1\]"),
-        (lambda d, t: d.solve("wirtinger", t * 2), r"a target with values from 0 to .*; expected .* in \[0, 1\]"),
         (lambda d, t: d.solve("wirtinger", levels_of(t)), "a target of uint8; expected linear light in"),
         (lambda d, t: d.solve("phases", t, file="gone.png"), "gone.png: no such file"),
         (lambda d, t: d.solve("double_phase", "astro.png"), "target that is the path 'astro.png'; .* OpenDisplay"),
@@ -253,21 +247,16 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: d.capture(t, t), "a phase that is the target, linear light .*; expected radians"),
         (lambda d, t: d.capture(np.zeros((1, 128, 128)), t), r"phase of \(1, 128, 128\); .* shows \(3, 128, 128\)"),
         (lambda d, t: d.capture(np.ones((3, 128, 128), np.complex64), t), "phase of complex64; expected radians"),
-        (
-            lambda d, t: d.capture(np.arange(3.0 * 128**2).reshape(PHASE[1:]) % 256, t),
-            "whole numbers up to 255: levels",
-        ),
+        (lambda d, t: d.capture(np.arange(3.0 * 128**2).reshape(PHASE[1:]) % 256, t), "numbers up to 255: levels"),
         (lambda d, t: d.capture(np.full((3, 128, 128), 1e30), t), r"reaches 1e\+30 rad, where float32 has lost the"),
         (lambda d, t: d.ideal(np.full((3, 128, 128), -2.7e5)), r"reaches 2\.7e\+05 rad, .* expected it modulo 2 pi"),
         (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase holds 49152 values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
-        (lambda d, t: hb.open_display("ideal", panel=256), "rows and columns such as .*; got 256"),
         (lambda d, t: hb.open_display("ideal", panel=(3, 128)), "a panel has 64 to 8192 pixels a side"),
         (lambda d, t: hb.open_display(3), "name: expected that of a display profile, or its path; got int"),
         (lambda d, t: hb.open_display("ideal", panel=(128, 128), seed="x"), "seed: expected a whole number; got str"),
         (lambda d, t: hb.open_display("ideal", device="gpu"), "unknown device 'gpu'; auto, cpu, cuda or cuda:N"),
         (lambda d, t: hb.open_bench(3), "file: expected a path; got int"),
-        (lambda d, t: hb.score(t, t, device="gpu"), "unknown device 'gpu'"),
         (lambda d, t: hb.score(t[:, 1:], target=t), "must both be"),
         (lambda d, t: hb.score(levels_of(t), target=t), "a capture of uint8; expected values='linear'"),
         (lambda d, t: hb.score(t, target=levels_of(t)), "a target of uint8; expected linear light"),
@@ -277,23 +266,18 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: hb.score(Path("a.png"), t), "a capture that is the path 'a.png'; expected linear light"),
         (lambda d, t: hb.score(d.solve("double_phase", t), t), r"a capture that is the phase \[rad\]; expected linear"),
         (lambda d, t: hb.score(t, t, metrics="psnr"), r'metrics: expected names in a list, such as \["psnr"\]; got'),
-        (lambda d, t: hb.score(t, t, metrics=3), "metrics: expected names in a list"),
         (lambda d, t: hb.score(t, t, metrics=["ms_ssim"]), "ms_ssim cannot be computed here of 104 x 104 pixels"),
         (lambda d, t: hb.score(t, t, metrics=("psrn",)), "did you mean 'psnr'"),
         (lambda d, t: hb.compare(t, {"a": t[:, 1:]}), r"capture 'a' of \(3, 103, 104\); expected .* \(3, 104, 104\)"),
         (lambda d, t: hb.compare(t, {"a": levels_of(t)}), "capture 'a' of uint8; expected linear light"),
         (lambda d, t: hb.compare(t, {"a": t * np.nan}), "not finite"),
         (lambda d, t: hb.compare(t, {3: t}), "captures: expected arrays by their names"),
-        (lambda d, t: hb.compare(t, [t]), "captures: expected arrays by their names"),
         (lambda d, t: hb.compare(t, {"a": t}, "compared.tif"), "'compared.tif' should end in .png, .jpg, .jpeg"),
         (lambda d, t: hb.compare(t, {}), "no captures to compare"),
         (lambda d, t: hb.compare(t, {"a": t}, f"{__file__}/a.png"), "a.png' cannot be written: File exists"),
         (lambda d, t: hb.score(torch.zeros(t.shape).to_sparse(), t), "a capture as a tensor that NumPy cannot read"),
-        (lambda d, t: hb.score(torch.empty(t.shape, device="meta"), t), "expected a dense one"),
-        (lambda d, t: hb.compare(t, {"a": t}, None), "path: expected a path; got NoneType"),
         (lambda d, t: hb.picture(t[:, 1:], t), r"a capture of \(3, 103, 104\) and a target of"),
         (lambda d, t: hb.load_records("gone"), "no records.csv"),
-        (lambda d, t: hb.load_records(3), "folder: expected a path; got int"),
     ],
 )
 def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:

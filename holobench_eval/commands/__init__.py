@@ -31,23 +31,13 @@ COMMANDS = {
         "show",
         "schema",
     ),
-    "Finished reports": (
-        "reports.figure",
-        "reports.check",
-        "reports.compare",
-        "reports.site",
-    ),
-    "Pictures and real displays": (
-        "doctor",
-        "score",
-        "session",
-        "twin",
-    ),
+    "Finished reports": ("reports.figure", "reports.check", "reports.compare", "reports.site"),
+    "Pictures and real displays": ("doctor", "score", "session", "twin"),
     "Your own methods and displays, and this program": (
-        "new_method",
-        "new_display",
-        "conformance",
-        "calibrate",
+        "own.new_method",
+        "own.new_display",
+        "own.conformance",
+        "own.calibrate",
     ),
 }
 

@@ -26,7 +26,7 @@ def displays(
     screen = console()
     for *cells, last in rows:
         padded = [cell.ljust(width) for cell, width in zip(cells, widths, strict=True)]
-        screen.print("  ".join([*padded, last]), markup=False, highlight=False, soft_wrap=True)
+        screen.print("  ".join([*padded, last]), markup=False, soft_wrap=True)
 
 
 def sources(folders: Iterable[Path]) -> Iterator[tuple[str, str]]:

@@ -105,7 +105,7 @@ def doctor() -> None:
     broken = [finding.what for finding in findings if finding.broken]
     last = f"broken: {', '.join(broken)}" if broken else "the core is complete; what is missing is optional"
     for line in (*remedies, last):  # never wrapped, so that commands can be copied
-        screen.print(line, soft_wrap=True, highlight=False, markup=False)
+        screen.print(line, soft_wrap=True, markup=False)
     raise typer.Exit(1 if broken else 0)
 
 

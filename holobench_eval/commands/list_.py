@@ -18,6 +18,7 @@ from rich.table import Table
 
 from ..core.errors import UserError, suggest
 from ..core.installed import shipped_configs
+from .displays import sources
 from .output import console
 
 if TYPE_CHECKING:
@@ -109,10 +110,8 @@ def _declared(kind: plugins.Kind, name: str) -> type[Any]:
 def profiles() -> Entries:
     """Every display profile of the package and of installed ones; one with a fault gives that."""
     from ..display import load_profile
-    from ..display.simulated.profile import names
-    from ..display.simulated.shelf import installed
 
-    for name in (*names(), *names(family=True), *installed()):
+    for name, _ in sources(()):
         try:
             profile = load_profile(name)
         except UserError as error:
@@ -168,7 +167,7 @@ def explain_study(screen: Console, name: str) -> None:
     _heading(screen, "studies", name, [])
     for key, text in {**_words(file), "config": str(file), "run": f"holoeval run {name}"}.items():
         said = key.replace("would_change", "would change the answer")
-        screen.print(escape(f"{said}: {text}"), highlight=False, soft_wrap=key == "config")
+        screen.print(escape(f"{said}: {text}"), soft_wrap=key == "config")
 
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
@@ -180,19 +179,19 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
     said = isolation.words(name, Path()) if kind == "methods" else words(cls)
     marks = [word for flag, word in MARKS.items() if getattr(cls, flag, False) is True]
     _heading(screen, kind, name, marks)
-    screen.print(escape(said.summary), highlight=False)
+    screen.print(escape(said.summary))
     if said.source:
-        screen.print(f"\nSource: {escape(said.source)}", highlight=False)
+        screen.print(f"\nSource: {escape(said.source)}")
     if hasattr(cls, "tuned"):
-        screen.print(f"\nTuned: {escape(cls.tuned)}", highlight=False)
+        screen.print(f"\nTuned: {escape(cls.tuned)}")
     if not said.parameters:
-        screen.print("\nIt has no parameters.", highlight=False)
+        screen.print("\nIt has no parameters.")
         return
-    screen.print("\nIts parameters (params: in a config), each with its default and what it may be:", highlight=False)
+    screen.print("\nIts parameters (params: in a config), each with its default and what it may be:")
     for entry in said.parameters:
         default = f" = {entry.default}" if entry.default else ""
-        screen.print(f"[bold]{entry.name}[/bold]{escape(default)}   ({escape(entry.allowed)})", highlight=False)
-        screen.print(Padding(escape(entry.meaning), (0, 0, 0, 4), expand=False), highlight=False)
+        screen.print(f"[bold]{entry.name}[/bold]{escape(default)}   ({escape(entry.allowed)})")
+        screen.print(Padding(escape(entry.meaning), (0, 0, 0, 4), expand=False))
 
 
 def explain_profile(screen: Console, name: str) -> None:
@@ -204,7 +203,7 @@ def explain_profile(screen: Console, name: str) -> None:
     profile = load_profile(name)
     shown = simulated(profile, None)
     _heading(screen, "profiles", name, [])
-    screen.print(escape("\n".join((shown.heading, shown.basis, *shown.lines))), highlight=False)
+    screen.print(escape("\n".join((shown.heading, shown.basis, *shown.lines))))
     table = Table(title="\neffects", title_justify="left", show_header=False)
     for effect in profile.effects():
         table.add_row(effect.name, escape(effect.text))
@@ -212,10 +211,10 @@ def explain_profile(screen: Console, name: str) -> None:
     try:
         refuse_far(profile.spec((256, 256)), profile.panel.distance)
     except UserError as error:
-        screen.print(escape(str(error)), highlight=False)
+        screen.print(escape(str(error)))
     else:
         if profile.network.method is None:
-            screen.print(f"holoeval show {name} draws them.", highlight=False)
+            screen.print(f"holoeval show {name} draws them.")
 
 
 def explain_metric(screen: Console, name: str) -> None:
@@ -224,8 +223,8 @@ def explain_metric(screen: Console, name: str) -> None:
 
     metric = next(metric for metric in catalogue() if metric.name == name)
     _heading(screen, "metrics", name, [])
-    screen.print(escape("\n\n".join(_paragraphs(metric))), highlight=False)
-    screen.print(f"\n{escape(_facts(metric))}\ncolumns: {', '.join(metric.columns)}", highlight=False)
+    screen.print(escape("\n\n".join(_paragraphs(metric))))
+    screen.print(f"\n{escape(_facts(metric))}\ncolumns: {', '.join(metric.columns)}")
 
 
 def explain_condition(screen: Console, name: str) -> None:
@@ -235,14 +234,14 @@ def explain_condition(screen: Console, name: str) -> None:
     kind = CHANGES[name]
     _heading(screen, "conditions", name, [])
     lines = (f"{kind.words}; {_values_of(kind)}", f"Model: {kind.model}", f"Changes: {', '.join(kind.stages)}")
-    screen.print(escape("\n".join(lines)), highlight=False)
+    screen.print(escape("\n".join(lines)))
     values = "count: 3" if kind.counted else "values: [...]"
-    screen.print(f"In a config: sweeps: [{{condition: {name}, {values}}}]", markup=False, highlight=False)
+    screen.print(f"In a config: sweeps: [{{condition: {name}, {values}}}]", markup=False)
 
 
 def _heading(screen: Console, kind: str, name: str, marks: list[str]) -> None:
     marked = f" ({', '.join(marks)})" if marks else ""
-    screen.print(f"[bold]{name}[/bold], one of the {kind}{marked}", highlight=False)
+    screen.print(f"[bold]{name}[/bold], one of the {kind}{marked}")
 
 
 MARKS = {

@@ -37,8 +37,8 @@ class _Screen(Console):
 
 def console() -> Console:
     """A console as wide as its terminal; wide enough for tables where there is none."""
-    screen = _Screen()
-    return screen if screen.is_terminal else _Screen(width=160)
+    screen = _Screen(highlight=False)
+    return screen if screen.is_terminal else _Screen(width=160, highlight=False)
 
 
 def write_report(
@@ -61,9 +61,9 @@ def write_report(
     print_answer(console, results)
     print_holes(console, results)
     if text := uncovered(records):
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        console.print(text, markup=False, soft_wrap=True)
     files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
-    console.print("\n".join(map(str, files)), highlight=False, soft_wrap=True)
+    console.print("\n".join(map(str, files)), soft_wrap=True)
     return results
 
 
@@ -77,7 +77,7 @@ def print_headline(console: Console, results: Results) -> None:
     for display in [] if over_displays.applies(results) else drawn.displays:
         console.print(board_of(drawn, display))
     for remark in remarks(results):
-        console.print(remark, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        console.print(remark, style="yellow", markup=False, soft_wrap=True)
 
 
 def board_of(drawn: Board, display: Display) -> Table:
@@ -119,7 +119,7 @@ def print_answer(console: Console, results: Results) -> None:
     from ..report.data.phrases import too_few
 
     for sentence in (*kind_of(results).answer(results), *filter(None, [too_few(results)])):
-        console.print(f"- {sentence}", markup=False, highlight=False)
+        console.print(f"- {sentence}", markup=False)
 
 
 def print_holes(console: Console, results: Results) -> None:
@@ -134,10 +134,10 @@ def print_holes(console: Console, results: Results) -> None:
         groups.setdefault((state, alike), []).append((method, condition, reason))
     if not groups:
         return
-    console.print(f"without a score: {len(results.holes)} of {len(results.frame)} cells", highlight=False)
+    console.print(f"without a score: {len(results.holes)} of {len(results.frame)} cells")
     for (state, _), cells in list(groups.items())[:MOST_REASONS]:
         whose = listed(dict.fromkeys(f"{method} on {condition}" for method, condition, _ in cells))
         line = f"{len(cells)} {state} ({whose}): {cells[0][2] or 'no reason given'}"
-        console.print(Padding(escape(line), (0, 0, 0, 2), expand=False), highlight=False)
+        console.print(Padding(escape(line), (0, 0, 0, 2), expand=False))
     if len(groups) > MOST_REASONS:
-        console.print(f"  and {len(groups) - MOST_REASONS} more reasons, in details.md", highlight=False)
+        console.print(f"  and {len(groups) - MOST_REASONS} more reasons, in details.md")

@@ -64,7 +64,6 @@ def plan(
         console.print(
             f"{unscored} of the done cells lack scores: {names}. 'holoeval rescore' fills them from kept captures, and "
             "'holoeval run' the rest on a simulated display.",
-            highlight=False,
             soft_wrap=True,
         )
     if all(row.seconds is None for row in rows):
@@ -75,9 +74,8 @@ def plan(
             console.print(
                 "A clone of the repository has what the shipped studies need in its folder artifacts; with --artifacts "
                 "FOLDER it need not be trained.",
-                highlight=False,
             )
-    console.print(f"output folder: {folder}", highlight=False, soft_wrap=True)
+    console.print(f"output folder: {folder}", soft_wrap=True)
 
 
 @dataclass(frozen=True)

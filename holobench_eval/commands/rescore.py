@@ -36,5 +36,5 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     with watching(console) as watch:
         outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=tuple(metric or grid.metrics))
     left = f"; {outcome.unscored} have nothing kept to score, and holoeval run computes them" * bool(outcome.unscored)
-    console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}", highlight=False)
+    console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}")
     write_report(console, study, outcome.records, folder, outcome.provenance)

@@ -79,7 +79,7 @@ def run(
         folder, grid = options.output_folder(study, output), plan(study)
         artifacts = options.learned_folder(artifacts, grid)
         if word := replaced(study, folder):
-            console.print(word, markup=False, highlight=False, soft_wrap=True)
+            console.print(word, markup=False, soft_wrap=True)
         many = options.thread_count(threads, where.workers, study)
         how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
         drawings = sheets(study, folder)

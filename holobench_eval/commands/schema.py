@@ -15,7 +15,7 @@ def study_schema() -> dict[str, Any]:
     """The schema of a config, with the names and the parameters of all that is installed."""
     from ..core import plugins
     from ..core.errors import UserError
-    from ..core.json_schema import json_schemas
+    from ..core.parameters import json_schemas
     from ..display.simulated.changes import KINDS
     from ..display.simulated.profile import names as profiles
     from ..display.simulated.shelf import installed
@@ -38,33 +38,26 @@ def study_schema() -> dict[str, Any]:
     study = shared.pop("Study") if "$ref" in study else study
     del shared["Changes"]  # a key of no file
 
-    methods, datasets = plugins.names("methods"), plugins.names("datasets")
-    method, dataset = _one_of(methods, r"\.py:"), _one_of(datasets, r"\.py:")
-    profile = _one_of([*profiles(), *profiles(family=True), *installed()], r"\.ya?ml$")
-    for key, definition, choice in (
-        ("name", "MethodEntry", method),
-        ("name", "Probe", method),
-        ("method", "Learned", method),
-        ("dataset", "Targets", dataset),
-        ("dataset", "Training", dataset),
-        ("profile", "Learned", profile),
-    ):
-        entry = shared[definition]["properties"]
-        entry[key] = {name: entry[key][name] for name in ("default", "description") if name in entry[key]} | choice
+    choices = {kind[:-1]: _one_of(plugins.names(kind), r"\.py:") for kind in plugins.KINDS}
+    choices["profile"] = _one_of([*profiles(), *profiles(family=True), *installed()], r"\.ya?ml$")
     for key, definition, what in (
         ("name", "MethodEntry", "method"),
         ("name", "Probe", "method"),
         ("method", "Learned", "method"),
         ("dataset", "Targets", "dataset"),
         ("dataset", "Training", "dataset"),
+        ("profile", "Learned", "profile"),
     ):
-        shared[definition]["allOf"] = [
+        entry = shared[definition]["properties"]
+        kept = {name: entry[key][name] for name in ("default", "description") if name in entry[key]}
+        entry[key] = kept | choices[what]
+        shared[definition].setdefault("allOf", []).extend(
             _params_of(key, name.partition(" ")[2], reference, shared[definition], shared)
             for name, reference in references.items()
             if name.startswith(f"{what} ")
-        ]
+        )
     display = shared["DisplayGrid"]
-    display["properties"]["profiles"] |= {"items": profile, "minItems": 1}
+    display["properties"]["profiles"] |= {"items": choices["profile"], "minItems": 1}
     display["oneOf"] = [{"required": [name]} for name in ("profiles", "learned", "bench")]
     shared["Sweep"]["properties"]["condition"] |= {"enum": list(KINDS)}
     metrics = catalogue()
@@ -73,7 +66,7 @@ def study_schema() -> dict[str, Any]:
     wanted = {"type": "array", "items": {"enum": [*(metric.name for metric in metrics), SPECKLE, control.NAME]}}
     shared["Protocol"]["properties"]["metrics"] |= {"anyOf": [wanted, {"type": "null"}]}
     entries = study["properties"]["methods"]
-    entries["items"] = {"anyOf": [method, entries["items"]]}
+    entries["items"] = {"anyOf": [choices["method"], entries["items"]]}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "holoeval: a study"}
     return head | study | {"$defs": shared}
 

@@ -19,8 +19,6 @@ from .output import print_answer, print_headline
 
 if TYPE_CHECKING:
     from ..report import Results
-    from ..report.data.layout import Layout
-    from ..study.folders.files import Folders
 
 # How files are read.
 VALUES = {
@@ -60,7 +58,7 @@ def score(
     print_headline(console, results)
     for hole in results.holes.to_dict("records"):
         text = f"{hole['state']}: {hole['label']} · {hole['target']}: {hole['reason']}"
-        console.print(text, style="red", markup=False, highlight=False, soft_wrap=True)
+        console.print(text, style="red", markup=False, soft_wrap=True)
     print_answer(console, results)
     print(f"{report}\n{output / 'report.html'}\n{output / 'table.csv'}\n{output / 'records.csv'}")
     raise typer.Exit(1 if len(results.holes) else 0)
@@ -88,10 +86,12 @@ def score_folders(
     from ..lab.dark import given_dark
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
+    from ..report.data.layout import Layout
     from ..study import provenance
+    from ..study.folders import FILES
     from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
-    from ..study.folders.scoring import Scoring, described
+    from ..study.folders.scoring import CONDITION, Scoring, described
     from ..study.store import Store
 
     if values not in VALUES:
@@ -118,38 +118,30 @@ def score_folders(
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned, told)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values, told), resumed=True)
-        console.print(f"--values {values}: {VALUES[values]}.", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"--values {values}: {VALUES[values]}.", markup=False, soft_wrap=True)
         with _steps(console, 2 * len(folders.captures) + len(folders.targets)) as step:
             found = scoring.records(step)
         records = [record.row(record.capture) for record in found]
         notes = [*folders.notes, *_in_part(records), *doubts(found, folders, scoring.domain)]
         for note in notes:
-            console.print(note, markup=False, highlight=False, soft_wrap=True)
+            console.print(note, markup=False, soft_wrap=True)
         known = provenance.end(output, known)
         words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
         words += ["--visible"] * visible + ["--aligned"] * aligned + (["--baseline", baseline] if baseline else [])
         words += [] if dark is None else ["--dark", dark]
         description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
-        layout = _layout(folders, scoring.domain, values, baseline, output.resolve().name, " ".join(notes))
+        layout = Layout(
+            title=f"Scores of photographs: {listed(folders.methods)}",
+            pairs=tuple((method, CONDITION) for method in folders.methods),
+            targets=tuple(folders.targets),
+            headline=f"psnr_{scoring.domain}",
+            baseline=baseline,
+            note=" ".join(notes),
+            measure=FILES,
+            values=values,
+            study=output.resolve().name,
+        )
         return write_report(layout, records, output, known, description)
-
-
-def _layout(folders: Folders, domain: str, values: str, baseline: str | None, study: str, note: str) -> Layout:
-    from ..report.data.layout import Layout
-    from ..study.folders import FILES
-    from ..study.folders.scoring import CONDITION
-
-    return Layout(
-        title=f"Scores of photographs: {listed(folders.methods)}",
-        pairs=tuple((method, CONDITION) for method in folders.methods),
-        targets=tuple(folders.targets),
-        headline=f"psnr_{domain}",
-        baseline=baseline,
-        note=note,
-        measure=FILES,
-        values=values,
-        study=study,
-    )
 
 
 def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
@@ -181,7 +173,7 @@ def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
         nonlocal last, done
         if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
             last = time.monotonic()
-            console.print(f"{done}/{total} steps; now {name}", markup=False, highlight=False, soft_wrap=True)
+            console.print(f"{done}/{total} steps; now {name}", markup=False, soft_wrap=True)
         done += 1
 
     yield line

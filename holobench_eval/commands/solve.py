@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 import shutil
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -52,7 +51,9 @@ def solve(
     decode(read(picture), str(picture), gray=True)  # what is wrong with it is said of the file that was named
     load_profile(display)
     study_in = partial(_study, _entries(names, values or []), picture, display, panel)
-    folder = output or next(folder for folder in _folders(picture) if _is_free(folder, picture, study_in(folder)))
+    # named like the picture, the first without a number
+    numbered = (RESULTS / f"{picture.stem}{f'-{number}' * (number > 1)}" for number in itertools.count(1))
+    folder = output or next(folder for folder in numbered if _is_free(folder, picture, study_in(folder)))
     is_new, config = not folder.exists(), folder / STUDY
     _copy(picture, folder)
     if not _is_free(folder, picture, study_in(folder)):
@@ -78,11 +79,6 @@ def solve(
         *(folder / what / label for what in ("phases", "captures") for label in labels),
     ):
         print(path)
-
-
-def _folders(picture: Path) -> Iterator[Path]:
-    """The folders of results that are named like a picture, the first without a number."""
-    return (RESULTS / f"{picture.stem}{f'-{number}' * (number > 1)}" for number in itertools.count(1))
 
 
 def _is_free(folder: Path, picture: Path, study: str) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import torch
 
@@ -19,24 +19,11 @@ WARM_UP = 2
 optimiser, plans of transforms and constants."""
 
 
-class Recorder(Protocol):
-    """Runs, records and replays one step on a device."""
-
-    def run(self, step: Callable[[], T], watched: bool = False) -> T:
-        """Run a step; watched: RuntimeError where it waits for a number of the device."""
-
-    def record(self, step: Callable[[], T]) -> T:
-        """Record the operations of a step without running them; what it returned, which each replay fills anew.
-
-        RuntimeError for a step that cannot be recorded.
-        """
-
-    def replay(self) -> None:
-        """Run the operations that were recorded, on the same memory."""
-
-
 class CudaGraph:
-    """The recorder of a GPU of NVIDIA: https://docs.pytorch.org/docs/stable/notes/cuda.html#cuda-graphs."""
+    """Runs, records and replays one step on a GPU of NVIDIA.
+
+    https://docs.pytorch.org/docs/stable/notes/cuda.html#cuda-graphs
+    """
 
     def __init__(self, device: torch.device) -> None:
         self._device = device
@@ -44,7 +31,10 @@ class CudaGraph:
             self._stream, self._graph = torch.cuda.Stream(), torch.cuda.CUDAGraph()
 
     def run(self, step: Callable[[], T], watched: bool = False) -> T:
-        """See ``Recorder``; on the stream that the step is recorded on, as libraries keep workspaces for each."""
+        """Run a step; watched: RuntimeError where it waits for a number of the device.
+
+        On the stream that the step is recorded on, as libraries keep workspaces for each.
+        """
         current, mode = torch.cuda.current_stream(self._device), torch.cuda.get_sync_debug_mode()
         self._stream.wait_stream(current)
         with warnings.catch_warnings(), torch.cuda.stream(self._stream):
@@ -58,17 +48,20 @@ class CudaGraph:
                 current.wait_stream(self._stream)
 
     def record(self, step: Callable[[], T]) -> T:
-        """See ``Recorder``."""
+        """Record the operations of a step without running them; what it returned, which each replay fills anew.
+
+        RuntimeError for a step that cannot be recorded.
+        """
         # The outer context gives the stream back even where the end of a failed recording raises.
         with torch.cuda.stream(self._stream), torch.cuda.graph(self._graph, stream=self._stream):
             return step()
 
     def replay(self) -> None:
-        """See ``Recorder``."""
+        """Run the operations that were recorded, on the same memory."""
         self._graph.replay()
 
 
-RECORDERS: Mapping[str, Callable[[torch.device], Recorder]] = {"cuda": CudaGraph}
+RECORDERS: Mapping[str, Callable[[torch.device], CudaGraph]] = {"cuda": CudaGraph}
 """By type of device; on others, steps run as they are."""
 
 
@@ -92,7 +85,7 @@ def repeated(step: Callable[[], T], device: torch.device) -> Callable[[], T]:
     return lambda: next(results)
 
 
-def _results(step: Callable[[], T], recorder: Recorder) -> Iterator[T]:
+def _results(step: Callable[[], T], recorder: CudaGraph) -> Iterator[T]:
     for _ in range(WARM_UP):
         yield recorder.run(step)
     try:

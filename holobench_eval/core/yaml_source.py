@@ -104,7 +104,9 @@ def parse(name: str, text: str) -> Document:
     try:
         root = _Loader(text).get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise UserError(f"{name}:{_line_and_column(error)}: {_sentence(error)}") from error
+        mark = error.problem_mark or error.context_mark
+        place = "1:1" if mark is None else f"{mark.line + 1}:{mark.column + 1}"
+        raise UserError(f"{name}:{place}: {_sentence(error)}") from error
     except yaml.YAMLError as error:
         raise UserError(f"{name}: not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(root, yaml.MappingNode):
@@ -112,11 +114,6 @@ def parse(name: str, text: str) -> Document:
         raise UserError(f"{name}:1:1: the file {fault}; expected 'key: value' lines")
     data = reader.value(root, ())
     return Document(name, text, data, reader.keys, reader.values)
-
-
-def _line_and_column(error: yaml.MarkedYAMLError) -> str:
-    mark = error.problem_mark or error.context_mark
-    return "1:1" if mark is None else f"{mark.line + 1}:{mark.column + 1}"
 
 
 def _sentence(error: yaml.MarkedYAMLError) -> str:

@@ -25,17 +25,7 @@ from ..display.traits import refuse_plane, traits_of
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .described import CAPTURE, IDEAL, PHASE, TARGET, Array, Described, described
-from .given import (
-    LIGHT,
-    RADIANS,
-    Numbers,
-    array_of,
-    as_in_config,
-    path_of,
-    tensor_of,
-    warn_of_levels,
-    whole,
-)
+from .given import LIGHT, RADIANS, Numbers, array_of, as_in_config, path_of, tensor_of, warn_of_levels, whole
 from .methods import method_of
 
 

@@ -55,7 +55,8 @@ def read_counts(
     """
     ending = path.suffix.lower()
     if ending in RAW_SUFFIXES:
-        return _raw(content, path)
+        raw = read_raw(content, str(path))
+        return Counts(raw.counts.transpose(2, 0, 1), raw.white, raw.black, is_raw=True)
     try:
         if ending == NUMBERS:
             return _counts(_planes_last(read_array(path, content=content), largest))
@@ -103,11 +104,3 @@ def step(values: NDArray[Any]) -> int:
     """The largest power of two, up to 256, that divides every unsigned value; 0 where there is no light at all."""
     joined = int(np.bitwise_or.reduce(values, axis=None))
     return min(joined & -joined, 256)
-
-
-def _raw(content: bytes, path: Path) -> Counts:
-    raw = read_raw(content, str(path))
-    black = np.array(raw.black, dtype=np.float32)
-    if black.max() >= raw.white:
-        raise UserError(f"{path}: black at {black.max():g} counts and white at {raw.white:g}; expected black below")
-    return Counts(raw.counts.transpose(2, 0, 1), raw.white, black[:, None, None], is_raw=True)

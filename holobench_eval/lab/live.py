@@ -11,7 +11,7 @@ from ..core.errors import UserError
 from ..methods.wirtinger import Wirtinger
 from .bench_file import BenchFile
 from .devices import Camera, DeviceError, SequenceSlm, Slm
-from .drivers.catalogue import checked_params, open_camera, open_slm
+from .drivers.catalogue import checked_params, open_device
 from .drivers.worker import closed_on_failure
 from .laser import laser
 from .photograph import Request
@@ -52,7 +52,7 @@ def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
     panel, camera = _driver("slm", bench.slm), _driver("camera", bench.camera)
     checked_params("camera", *camera)  # before a panel is opened for nothing
     try:
-        slm = open_slm(*panel)
+        slm: Slm = open_device("slm", *panel)
         with closed_on_failure(slm.close):
             if slm.shape != bench.panel.shape:
                 shape = list(bench.panel.shape)
@@ -62,7 +62,7 @@ def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
                     f"panel.frames is {bench.panel.frames}, but driver '{panel[0]}' shows one pattern an exposure; "
                     "leave it out, give the driver show_sequence, or exchange files (holoeval session)"
                 )
-            return slm, open_camera(*camera)
+            return slm, open_device("camera", *camera)
     except DeviceError as error:
         raise UserError(f"bench '{bench.name}': {error}") from error
 

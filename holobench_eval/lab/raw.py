@@ -21,12 +21,12 @@ class RawFrame:
 
     counts: ``(Hs, Ws, 3)`` uint16 red, green, blue at half the sensor's rows and columns, black level not subtracted,
     as the sensor lies (a camera's notion of upright is not followed); white: counts from which a sample is saturated;
-    black: counts of red, green and blue without light, as the file has them.
+    black: counts of red, green and blue without light ``(3, 1, 1)``, as the file has them, below white.
     """
 
     counts: NDArray[np.uint16]
     white: float
-    black: tuple[float, float, float]
+    black: NDArray[np.float32]
 
 
 def read_raw(content: bytes, name: str = "the RAW file") -> RawFrame:
@@ -82,14 +82,14 @@ def _frame(raw: Any, where: str) -> RawFrame:
     first, second = (plane.astype(np.float64) for plane in planes["G"])
     green = np.where(np.maximum(first, second) >= white, np.maximum(first, second), np.rint((first + second) / 2))
     counts = np.stack([planes["R"][0], green.astype(np.uint16), planes["B"][0]], axis=-1)
-    return RawFrame(counts, white, _black(raw, letters))
+    black = _black(raw, letters)
+    if black.max() >= white:
+        raise UserError(f"{where}: black at {black.max():g} counts and white at {white:g}; expected black below")
+    return RawFrame(counts, white, black)
 
 
-def _black(raw: Any, letters: str) -> tuple[float, float, float]:
+def _black(raw: Any, letters: str) -> NDArray[np.float32]:
     """Black levels of red, green (the mean of its two) and blue."""
-    levels = list(raw.black_level_per_channel)
-    red, green, blue = (
-        float(np.mean([level for level, letter in zip(levels, letters, strict=False) if letter == wanted]))
-        for wanted in "RGB"
-    )
-    return red, green, blue
+    sites = list(zip(raw.black_level_per_channel, letters, strict=False))
+    levels = [np.mean([level for level, letter in sites if letter == wanted]) for wanted in "RGB"]
+    return np.array(levels, dtype=np.float32)[:, None, None]

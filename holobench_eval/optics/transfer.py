@@ -13,8 +13,8 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from ..core.allocator import LARGEST_KEPT
 from ..core.compiled import AVAILABLE
+from ..core.device import LARGEST_KEPT
 from .blocks import in_blocks, in_parts
 from .kernel.sizes import LANES, Steps, steps
 

@@ -29,8 +29,7 @@ from pathlib import Path
 
 import torch
 
-from ..core.allocator import give_back_freed_memory
-from ..core.device import CPU
+from ..core.device import CPU, give_back_freed_memory
 from ..core.errors import StorageError
 from ..core.hashing import digest
 from ..core.installed import __version__

@@ -34,6 +34,7 @@ def check_method(method: Any) -> None:
     captures only with ``camera = True``. One that learns is prepared first, with three smooth images.
     """
     cls = method if isinstance(method, type) else type(method)
+    assert is_dataclass(cls), f"{cls.__name__} is not a dataclass; write @dataclass(frozen=True) above it"
     instance = _default(cls) if isinstance(method, type) else method
     _check_parameters(cls, instance)
     try:
@@ -46,11 +47,11 @@ def check_method(method: Any) -> None:
     fewest = 3 if photographs else 1  # a capture is of all colours of the display
     _check_solution(instance, bench, _target(bench, images=1, channels=3), learned)
     _check_solution(instance, bench, _target(bench, images=2, channels=fewest), learned)
-    _check_repeatable(instance, bench, _target(bench, images=2, channels=fewest), learned)
+    again = [_solve(instance, bench, _target(bench, images=2, channels=fewest), learned)[0] for _ in range(2)]
+    assert torch.equal(*again), f"{cls.__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
 def _default(cls: type[Any]) -> Any:
-    assert is_dataclass(cls), f"{cls.__name__} is not a dataclass; write @dataclass(frozen=True) above it"
     try:
         return cls()
     except TypeError as error:
@@ -59,7 +60,6 @@ def _default(cls: type[Any]) -> Any:
 
 def _check_parameters(cls: type[Any], instance: Any) -> None:
     name = cls.__name__
-    assert is_dataclass(cls), f"{name} is not a dataclass; write @dataclass(frozen=True) above it"
     for item in fields(cls):
         try:
             setattr(instance, item.name, getattr(instance, item.name))
@@ -120,11 +120,6 @@ def _check_solution(method: Any, bench: CalibratedBench, target: Tensor, learned
     assert torch.equal(target, before), f"{name}.solve changed its target; clone it first"
     declared = traits_of(method).camera or handle.captures == 0
     assert declared, f"{name} captures, but declares no camera; set camera = True"
-
-
-def _check_repeatable(method: Any, bench: CalibratedBench, target: Tensor, learned: Mapping[str, Any] | None) -> None:
-    (first, _), (again, _) = (_solve(method, bench, target, learned) for _ in range(2))
-    assert torch.equal(first, again), f"{type(method).__name__}.solve is not repeatable; draw from bench.generator(...)"
 
 
 def _solve(

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.seeds import seed
 from ..imaging.grid import fiducial
@@ -109,7 +108,8 @@ def photograph(pose: Pose, picture: Frame | None = None) -> Frame:
     """
     draw = np.random.default_rng(seed("fiducial photograph", pose.number))
     wanted = fiducial(pose.shape).image.numpy() if picture is None else picture
-    light = _finer(wanted) * speckle((wanted.shape[0] * FINER, wanted.shape[1] * FINER), pose.contrast, draw)
+    finer = cv2.resize(wanted, None, fx=FINER, fy=FINER, interpolation=cv2.INTER_LINEAR)  # pixel areas kept
+    light = finer * speckle((finer.shape[0], finer.shape[1]), pose.contrast, draw)
     rows, columns = ((np.arange(side * SUBPIXELS) + 0.5) / SUBPIXELS - 0.5 for side in pose.sensor)
     points = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(1, -1, 2)
     region = cv2.perspectiveTransform(points, np.linalg.inv(pose.homography)).reshape(len(rows), len(columns), 2)
@@ -134,13 +134,6 @@ def speckle(shape: tuple[int, int], contrast: float, draw: np.random.Generator, 
     random = 1 - math.sqrt(1 - contrast**2)
     intensity = (math.sqrt(1 - random) + math.sqrt(random) * real) ** 2 + random * imaginary**2
     return np.asarray(intensity, dtype=np.float32)
-
-
-def _finer(picture: NDArray[np.float32]) -> Frame:
-    """``FINER`` samples a pixel, pixel areas kept."""
-    height, width = picture.shape
-    larger = cv2.resize(picture, (width * FINER, height * FINER), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(larger)
 
 
 def _mapped(homography: Array, points: Array) -> Array:

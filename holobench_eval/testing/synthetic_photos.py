@@ -23,7 +23,8 @@ def impostors(shape: tuple[int, int], number: int) -> Iterator[tuple[str, Frame]
     picture = grid.image.numpy()
     for grain in (1.0, 4.0, 12.0):
         yield f"speckle {grain:g} px wide", speckle(pose.sensor, 1.0, draw, finer=grain)
-    yield "checkerboard", photograph(pose, _checkerboard(shape))
+    y, x = np.indices(shape) // 18
+    yield "checkerboard", photograph(pose, ((y + x) % 2).astype(np.float32))
     yield "grid without marks", photograph(pose, _discs(shape, grid.centres, grid.radius))
     yield (
         "grid with its marks shuffled",
@@ -79,11 +80,6 @@ def _lattice(shape: tuple[int, int], finer: float) -> Frame:
     step = finer * grid.spacing
     x, y = np.meshgrid(np.arange(step, shape[1] - step / 2, step), np.arange(step, shape[0] - step / 2, step))
     return _discs(shape, np.stack([x, y], axis=-1).reshape(-1, 2), finer * grid.radius)
-
-
-def _checkerboard(shape: tuple[int, int]) -> Frame:
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    return ((y // 18 + x // 18) % 2).astype(np.float32)
 
 
 def _other_shapes(shape: tuple[int, int]) -> list[tuple[int, int]]:

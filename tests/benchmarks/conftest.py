@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from holobench_eval.core.allocator import keep_freed_memory
+from holobench_eval.core.device import keep_freed_memory
 from holobench_eval.core.installed import installed
 
 sys.path.insert(0, str(Path(__file__).parent))

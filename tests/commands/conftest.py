@@ -1,7 +1,5 @@
 """A command as a person calls it, and where it computes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Every command that takes a display or a study works on one laser or three, one bit or eight, and any panel."""
 
-from __future__ import annotations
-
 import inspect
 from pathlib import Path
 from typing import Any

@@ -1,10 +1,8 @@
 """The command prints what was fitted, what it gives and what was wanted."""
 
-from __future__ import annotations
-
 import pytest
 
-from holobench_eval.commands.calibrate import calibrate
+from holobench_eval.commands.own.calibrate import calibrate
 from holobench_eval.study.calibration.fitting import Fitting
 
 

@@ -45,12 +45,12 @@ def named(findings, what):
 def test_this_installation_has_all_that_the_core_needs(capsys):
     code, said = exit_code(), capsys.readouterr().out
     assert code == 0, said
-    assert "the core is complete" in said
-    assert "cameras: gphoto2" in said
 
 
 def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
     findings = examine()
+    assert all(each.remedy for each in findings if each.state != "ok")
+    assert not [each for each in findings if "docs/" in each.found + each.remedy]  # which a wheel lacks
     assert named(findings, "panels: monitor") == Finding("panels: monitor", "ok", "2.1; HDMI-2, 1920x1080")
     absent = named(findings, "panels: slmsuite")
     assert (absent.state, absent.remedy) == ("missing", "pip install 'x[slmsuite]'")
@@ -83,11 +83,6 @@ def test_what_pip_gets_is_in_the_pinned_versions(quick):
     commands = [named(findings, what).remedy for what in ("peer odak", "peer torchoptics", "camera RAW files")]
     assert commands == [installing(extra="peers")] * 2 + [installing(extra="raw")]
     assert all(Path(shlex.split(command)[3]).is_file() for command in commands)
-
-
-def test_everything_missing_has_something_to_do_and_nothing_refers_to_pages_that_a_wheel_lacks(quick):
-    assert all(each.remedy for each in examine() if each.state != "ok")
-    assert not [each for each in examine() if "docs/" in each.found + each.remedy]
 
 
 def test_weights_that_are_absent_are_one_command_away(quick, tmp_path):
@@ -144,7 +139,5 @@ def test_what_hangs_is_cut_off_and_what_crashes_is_told():
 
 def test_drivers_that_crash_cost_one_line_and_no_exit_code(quick):
     quick.setattr(module, "_ask", lambda code, *_: "ends with -11: x" if "drivers" in code else {"errors": {}})
-    found = named(examine(), "drivers")
-    assert found.state == "warning"
-    assert "ends with -11" in found.found
+    assert named(examine(), "drivers").state == "warning"
     assert exit_code() == 0

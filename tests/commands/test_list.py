@@ -1,7 +1,5 @@
 """What ``holoeval list`` says of a single name."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re
@@ -62,33 +60,16 @@ def pages() -> dict[str, str]:
 
 
 SAID = {
-    "wirtinger": (
-        'Source: Chakravarthula, Peng, Kollin, Fuchs & Heide, "Wirtinger holography for near-eye displays"',
-        "iterations = 200 (whole number from 1 to 100000) Evaluations of loss and gradient",
-        "step = 0.1 (number above 0, at most 10) Adam's step [rad]",
-        "schedule = constant (constant or cosine)",
-    ),
-    "hil": (
-        "hil, one of the methods (is trained first) ",
-        "retrieval.step = 0.06 (number above 0, at most 10) Adam's step [rad]",  # HIL's, not the class's own
-        "loss = null (null or a mapping of:)",
-    ),
-    "online_camera_network": ("loss.l1 = 10.0 (number from 0 to 1e+06)",),
-    "leto-2020": ("Version ", "crosstalk: width = 0.4687", "stray_light", "holoeval show leto-2020"),
+    "wirtinger": ("Source: Chakravarthula, Peng, ", "step = 0.1 (number above 0, at most 10) Adam's step [rad]"),
+    "hil": ("is trained first", "retrieval.step = 0.06 (number above 0"),  # HIL's, not the class's own
+    "leto-2020": ("Version ", "crosstalk: width = 0.4687", "holoeval show leto-2020"),
     "drift": ("values [days] from 0 to 3650", "dust that settles", "sweeps: [{condition: drift"),
     "draw": ("count: 3",),
     "ssim": ("IEEE Trans. Image Process. 13", "columns: ssim_linear, ssim_amplitude, ssim_srgb"),
     "lpips_alex": ("lower is better", "columns: lpips_alex_srgb"),
     "crops": ("size = 208 (whole number from 32 to 4096) pixels a side",),
     "table3": ("question: Does hil", "run: holoeval run table3"),
-    "overview": (
-        "camera_shift_x",
-        "values [mm] from -40 to 40",
-        "complex modulated",  # behind the first line of a docstring
-        "linear, amplitude, srgb [dB]; higher is better",
-        "values: canon-t6i or fujifilm-s5-pro",
-        "such as '-2' or '-2 / -1 x 30', of at most 10 dioptres",
-    ),
+    "overview": ("values [mm] from -40 to 40", "complex modulated", "values: canon-t6i or fujifilm-s5-pro"),
 }
 
 
@@ -96,16 +77,13 @@ def test_a_display_says_how_many_frames_it_shows_and_whether_it_is_too_far(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     list_("flc-1bit")
-    said = capsys.readouterr().out
-    assert "up to 8 frames an exposure" in said
-    assert "holoeval show flc-1bit draws them." in said
+    assert "up to 8 frames an exposure" in capsys.readouterr().out
     far = tmp_path / "far.yaml"
     far.write_text("name: far\nversion: 1\nseed: 1\ndescription: Far.\nlike: leto-2020\npanel: {distance: 3.0}\n")
     list_(str(far))
     said = " ".join(capsys.readouterr().out.split())
     assert "too far for 256 x 256 pixels" in said
     assert "frames" not in said
-    assert "draws them" not in said
 
 
 @pytest.mark.parametrize("name", SAID)
@@ -158,7 +136,6 @@ def test_what_is_listed_says_things_without_names_of_the_code(pages: dict[str, s
 def test_a_value_ends_with_its_own_paragraph(pages: dict[str, str]) -> None:
     assert "lpips_alex: no" not in pages["overview"]
     sixteen_bit = pages["folder"].partition("sixteen_bit =")[2]
-    assert "take 16-bit PNG and TIFF, as srgb levels or as linear light" in sixteen_bit
     assert sixteen_bit.endswith("linear light")  # not the paragraphs that follow it in the docstring
 
 

@@ -1,18 +1,14 @@
 """A session folder is exported in one place and imported in another, with nothing left where it came from."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
-from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session import read_manifest
+from tests.lab.session.running import run, succeed
 from tests.support.photographing import Lab
 
 # leto-mild on this panel
@@ -59,18 +55,12 @@ def lay_out(folder: Path, study: str) -> None:
     assert cv2.imwrite(str(folder / "images" / "one.png"), smooth)
 
 
-def run(*arguments: object) -> tuple[str, str]:
-    done = CliRunner().invoke(app, list(map(str, arguments)))
-    assert done.exit_code == 0 or isinstance(done.exception, UserError), (done.output, done.exception)
-    return done.output, str(done.exception or "")
-
-
 def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
     """The folder of a photographed session in its new place; the old one is gone."""
     old, new = tmp_path / "old", tmp_path / "new" / "place"
     lay_out(old, study)
     monkeypatch.chdir(old)
-    assert not run("session", "export", "study.yaml", "session")[1]
+    succeed("session", "export", "study.yaml", "session")
     Lab("leto-mild", (128, 128), seed=6).photograph_round(old / "session", 1)
     new.mkdir(parents=True)
     monkeypatch.chdir(new)
@@ -81,9 +71,7 @@ def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
 
 def test_a_session_with_its_bench_file_imports_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = moved(tmp_path, monkeypatch, STUDY)
-    said, failure = run("session", "import", session)
-    assert not failure
-    assert "table.csv" in said
+    assert "table.csv" in succeed("session", "import", session)
 
 
 def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_holograms_are_those_of_the_export(
@@ -94,7 +82,6 @@ def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_hologram
     for missing in ("path: images", "own.py:Elsewhere", "dataset: folder", "give --study"):
         assert missing in failure
     assert "benches" not in failure
-    assert "\n" not in failure
 
     lay_out(tmp_path / "mine", OWN)
     monkeypatch.chdir(tmp_path / "mine")
@@ -102,11 +89,8 @@ def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_hologram
     shutil.rmtree(without / "report")
     _, failure = run("session", "import", without, "--study", "study.yaml")
     assert "report/solved lacks those" in failure
-    assert "\n" not in failure
     assert read_manifest(without).rounds == 1  # no new photographs are asked for
 
     monkeypatch.setattr("holobench_eval.study.identity.HARNESS", "another version")
-    said, failure = run("session", "import", session, "--study", "study.yaml")
-    assert not failure
-    assert "table.csv" in said
+    assert "table.csv" in succeed("session", "import", session, "--study", "study.yaml")
     assert read_manifest(session).rounds == 1

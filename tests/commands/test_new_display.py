@@ -1,12 +1,10 @@
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from holobench_eval.commands.new_display import display_text, new_display
+from holobench_eval.commands.own.new_display import display_text, new_display
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.parameters import parameters
 from holobench_eval.display import load_profile

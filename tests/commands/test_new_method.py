@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import runpy
 import subprocess
 import sys
@@ -10,7 +8,7 @@ import pytest
 import torch
 
 from holobench_eval.commands import app
-from holobench_eval.commands.new_method import write_method
+from holobench_eval.commands.own.new_method import write_method
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile

@@ -1,7 +1,5 @@
 """Nothing is asked of a network at run time: a study runs where there is none."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

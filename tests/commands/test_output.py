@@ -1,7 +1,5 @@
 """What a study leaves on the terminal: tables that fit it, and why cells have no score."""
 
-from __future__ import annotations
-
 import codecs
 import io
 from typing import Any

@@ -1,7 +1,5 @@
 """``holoeval rescore`` and ``check`` with a metric that came, or changed, after a study was run."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +23,7 @@ from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.store import Store
 from tests.commands import test_moved_session as sessions
+from tests.lab.session.running import run, succeed
 from tests.study.test_rescore import BOTH, ONE, PICTURE, cells, forget
 from tests.support import another_metric
 from tests.support.another_metric import COLUMN, NAME
@@ -35,11 +34,6 @@ from tests.support.trained_study import compute
 def _one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Others would not know the metric."""
     monkeypatch.setattr(executors, "executor", lambda *_, **__: executors.Serial())
-
-
-def rescored(*arguments: object) -> tuple[str, str]:
-    """What the command says, and its error."""
-    return sessions.run("rescore", *arguments)
 
 
 @pytest.fixture
@@ -75,8 +69,7 @@ def report(finished: Path, tmp_path: Path, add: Callable[[int], None]) -> Path:
 def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report: Path) -> None:
     config = report.parent / "study.yaml"
     before = pd.read_csv(report / "records.csv")
-    said, failure = rescored(config, "--output", report, "--metric", NAME, "--threads", 1)
-    assert not failure
+    said = succeed("rescore", config, "--output", report, "--metric", NAME, "--threads", 1)
     assert "14 captures scored again, 0 solved" in said
     assert "nothing kept" not in said
     after = pd.read_csv(report / "records.csv")
@@ -92,26 +85,24 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
 
 def test_a_plan_says_which_columns_of_what_is_done_are_empty(report: Path) -> None:
     config = report.parent / "study.yaml"
-    said, failure = sessions.run("plan", config, "--output", report)
-    assert not failure
+    said = succeed("plan", config, "--output", report)
     (line,) = (line for line in said.splitlines() if "lack scores" in line)
     assert line.startswith(f"14 of the done cells lack scores: {NAME}. 'holoeval rescore' fills them from kept")
-    rescored(config, "--output", report)
-    assert "lack scores" not in sessions.run("plan", config, "--output", report)[0]
+    succeed("rescore", config, "--output", report)
+    assert "lack scores" not in succeed("plan", config, "--output", report)
 
 
 def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> None:
     config = report.parent / "study.yaml"
     forget(config)
-    said, failure = rescored(config, "--output", report)
-    assert not failure
+    said = succeed("rescore", config, "--output", report)
     words = " ".join(said.split())
     assert "12 captures scored again, 0 solved; 2 have nothing kept to score, and holoeval run computes them" in words
     assert pd.read_csv(report / "records.csv").filter(like=COLUMN).isna().sum().item() == 2
 
 
 def test_a_metric_that_the_study_does_not_have_is_refused_with_the_nearest(report: Path) -> None:
-    _, failure = rescored(report.parent / "study.yaml", "--output", report, "--metric", "psnt")
+    _, failure = run("rescore", report.parent / "study.yaml", "--output", report, "--metric", "psnt")
     assert failure.startswith("--metric psnt: the study has no such metric; did you mean 'psnr'? allowed: match, peak")
 
 
@@ -120,7 +111,7 @@ def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(
 ) -> None:
     config = tmp_path / "study.yaml"
     config.write_text(PICTURE)
-    _, failure = rescored(config, "--output", tmp_path / "never")
+    _, failure = run("rescore", config, "--output", tmp_path / "never")
     assert failure == f"{tmp_path / 'never'} has no captures; holoeval run {config} takes them"
     assert not phases_of(tmp_path / "never").folder.exists()
 
@@ -142,11 +133,11 @@ def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_aga
     report: Path, add: Callable[[int], None]
 ) -> None:
     config = report.parent / "study.yaml"
-    rescored(config, "--output", report)
+    succeed("rescore", config, "--output", report)
     add(2)
     _, problems = problems_in(report)
     assert problems == [f"{report}: '{NAME}' was of version v2, 1, is now of v2, 2; score its captures again"]
-    rescored(config, "--output", report)
+    succeed("rescore", config, "--output", report)
     assert problems_in(report) == (1, [])
 
 
@@ -155,7 +146,7 @@ def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of
 ) -> None:
     add(1)
     session = sessions.moved(tmp_path, monkeypatch, sessions.STUDY.replace("[psnr]", f"[psnr, {NAME}]"))
-    assert not sessions.run("session", "import", session)[1]
+    succeed("session", "import", session)
     photographs, photograph = list[str](), RealBench.photograph
 
     def photographed(self: RealBench, *args: Any, **named: Any) -> Any:
@@ -167,7 +158,7 @@ def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of
         for file in Store(session / "report").folder.glob("*.npy") if not is_kept else ():
             file.unlink()
         add(version)
-        assert not sessions.run("session", "import", session)[1]
+        succeed("session", "import", session)
         assert photographs == []
         assert read_manifest(session).rounds == 1
         table = pd.read_csv(session / "report" / "records.csv").set_index("method")
@@ -187,12 +178,9 @@ def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_sco
         build_report(load_study(config), outcome.records, folder, outcome.provenance)
     identity.versions.cache_clear()
     before = pd.read_csv(folder / "records.csv")
-    with pytest.raises(
-        UserError, match=r"no score 'psnr_linear' of today's versions \(protocol v2\); holoeval rescore"
-    ):
+    with pytest.raises(UserError, match=r"no score 'psnr_linear' of today's versions \(protocol v2\)"):
         write_again(config, folder)
-    said, failure = rescored(config, "--output", folder)
-    assert not failure
+    said = succeed("rescore", config, "--output", folder)
     assert "14 captures scored again, 0 solved" in said
     pd.testing.assert_frame_equal(pd.read_csv(folder / "records.csv"), before)
     assert {parted(version)[0] for version in provenance.read(folder)["scores"].values()} == {"v2"}

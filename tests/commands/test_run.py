@@ -1,7 +1,5 @@
 """What ``holoeval run`` does beside the cells."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The JSON schema of configs: it takes what ships, and refuses by structure what a config may not be."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``holoeval score`` on photographs as laboratories have them: one laser, too dark, cut off, speckled, aligned."""
 
-from __future__ import annotations
-
 import io
 import re
 import shutil
@@ -21,7 +19,7 @@ from holobench_eval.metrics import score
 from holobench_eval.optics.colour import srgb_decode, srgb_encode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
-from tests.support.photographed import captured, drowned, photograph, pose, save
+from tests.support.photographed import captured, drowned, few, photograph, pose, save
 from tests.support.reports import whole
 
 SHAPE = (160, 200)
@@ -33,10 +31,6 @@ LASERS = np.array([1.0, 0.9, 0.8], np.float32)[:, None, None]
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Only the two metrics that are quick."""
-
-    def few(*pictures: Any, **options: Any) -> dict[str, float]:
-        return score(*pictures, **{**options, "metrics": ("psnr", "ssim")})
-
     monkeypatch.setattr(scored_pictures, "score", few)
 
 
@@ -81,8 +75,6 @@ def test_a_cut_capture_names_the_side_and_with_visible_its_part_is_scored_and_it
     assert shares.loc["cut", "share_seen"] == pytest.approx(0.8, abs=0.01)
     assert shares["share_scored"].to_list() == pytest.approx([0.8] * 2, abs=0.01)
     assert "Seen of it: cut 79." in terminal
-    assert "seen [%]" in text
-    assert "--visible" in text
     # Both are scored on the same pixels, and the same photograph with the same speckle has nearly the same score.
     found = records[KEY].droplevel("target")
     assert found["cut"] == pytest.approx(found["whole"], abs=1.0)
@@ -91,8 +83,8 @@ def test_a_cut_capture_names_the_side_and_with_visible_its_part_is_scored_and_it
 
 def test_visible_changes_no_score_of_captures_that_show_all(tmp_path):
     root = cut_off(tmp_path, a=0, b=0)
-    _, _, before = run(root)
-    _, _, after = run(root, visible=True)
+    (_, said, before), (_, _, after) = run(root), run(root, visible=True)
+    assert said.startswith("--values stored: ")
     assert after[KEY].to_dict() == before[KEY].to_dict()
     assert (after["share_scored"] == 1).all()
 
@@ -121,9 +113,7 @@ def test_aligned_captures_are_scored_as_they_are_however_speckled(tmp_path):
     assert (records["state"] == "failed").all()
     text, _, records = run(tmp_path, aligned=True)
     assert records["state"].droplevel("target").to_dict() == {"larger": "failed", "speckled": "done"}
-    assert "200 x 162 pixels and the target 200 x 160; aligned captures have the size of their target" in text
-    assert "The geometry is given" in text
-    assert "--aligned" in text
+    assert "aligned captures have the size of their target" in text
     levels = np.round(capture * 255).astype(np.float32) / 255
     expected = score(levels, np.round(target * 255) / 255, metrics=("psnr",), stored=True, refine=False, blur=())
     assert records.loc[("speckled", "astronaut"), KEY] == pytest.approx(expected["psnr_stored"], abs=1e-3)
@@ -181,11 +171,8 @@ def test_captures_that_are_mirrored_clipped_or_nearly_the_target_are_named_and_t
     share = records.loc[("clipped", "astronaut"), "saturated"]
     assert share > 0.05
     for said in (text, terminal):
-        names = "padded/astronaut, padded/coffee."
-        assert f"Nearly the target itself, which a photograph with sensor noise is not: {names}" in said
-        assert re.search(r"Mirrored against the other captures of \d+ x \d+ pixels", said)
+        assert "is not: padded/astronaut, padded/coffee." in said
         assert "so: mirrored/astronaut, mirrored/coffee." in said
-        assert "more than 0.1% of the scored samples at full scale: clipped/astronaut" in said
         assert f"clipped/astronaut {share:.2%}" in said
     assert "fair/" not in terminal
 
@@ -215,15 +202,13 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
     assert off["dim"] == pytest.approx(true["dim"], abs=0.1)
     assert off["bright"] == pytest.approx(true["bright"], abs=0.1)
     assert "Bright where the target is darkest, by more than 5% of its white: dim/astronaut" in wrong[1]
-    for said in wrong[:2]:
-        assert "take it off with --dark" in said
     assert "Bright where" not in right[1] + terminal
-    assert "--dark 4096" in text
-    for said in run(tmp_path / "black", "linear", aligned=True, dark="4")[:2]:
-        assert "of its white, although --dark took 4 counts off: dim/astronaut" in said
+    assert (
+        "although --dark took 4 counts off: dim/astronaut"
+        in run(tmp_path / "black", "linear", aligned=True, dark="4")[1]
+    )
     assert "Darker than" not in text + wrong[0]
-    for said in run(tmp_path / "black", "linear", aligned=True, dark="4800")[:2]:
-        assert "Darker than the target where it is darkest, by more than 5% of its white: dim/astronaut" in said
+    assert "Darker than the target" in run(tmp_path / "black", "linear", aligned=True, dark="4800")[1]
     with pytest.raises(UserError, match="not off encoded values; expected --values linear"):
         run(tmp_path / "black", "srgb", dark="4096")
     for path in (tmp_path / "none" / "captures").glob("*/*.tif"):  # too much was taken off by other software
@@ -269,8 +254,7 @@ def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tm
             save(tmp_path / "captures" / method / f"{name}.png", 0.9 * seen)
     text, terminal, records = run(tmp_path, aligned=True)
     assert (records["state"] == "done").all()
-    for said in (text, terminal):
-        assert "Not alike pixel to pixel, with correlations below 0.25: wrong/astronaut" in said
+    assert "Not alike pixel to pixel, with correlations below 0.25: wrong/astronaut" in text
     assert "right/" not in terminal.partition("Not alike")[2].partition("\n")[0]
 
 

@@ -1,7 +1,5 @@
 """One picture is solved by one command, whose study can be run again."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -85,16 +83,9 @@ def test_a_display_of_one_laser_is_called_by_no_other_colour(picture: Path, caps
     Path("one.yaml").write_text(f"name: one\nversion: 1\nseed: 1\ndescription: One.\nlike: leto-2020\n{panel}\n")
     solve("double_phase", picture, display="one.yaml", panel=(128, 128), output=Path("out"))
     assert "shown in gray, by the one wavelength of the display" in capsys.readouterr().out
-    assert "of one wavelength, so that targets are gray" in Path("out/report.md").read_text()
     (note,) = Path("out/captures").rglob("*.json")
     written = "".join(Path("out", name).read_text() for name in ("details.md", "columns.md", note.relative_to("out")))
-    assert "gamma = [1.125], gain = [1.009]" in written
     assert not re.findall(r"\b(?:red|green|R/G/B)\b", written)
-
-
-def test_arguments_in_the_other_order_are_told(picture: Path) -> None:
-    with pytest.raises(UserError, match=r"the picture comes second: holoeval solve METHODS my picture\.png"):
-        solve(str(picture), Path("wirtinger"))
 
 
 def test_a_report_of_other_methods_pictures_or_displays_stays(picture: Path) -> None:

@@ -1,6 +1,7 @@
-from __future__ import annotations
-
+import platform
 import random
+import subprocess
+import sys
 
 import cv2
 import numpy as np
@@ -113,3 +114,26 @@ def test_what_one_cell_left_behind_does_not_reach_the_random_numbers_of_the_next
         with repeatable(1):
             drawn.append((random.random(), float(np.random.rand()), float(torch.rand(()))))  # noqa: NPY002
     assert drawn[0] == drawn[1]
+
+
+STEPS = """
+import ctypes, resource
+import numpy as np
+from holobench_eval.core.device import keep_freed_memory
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    np.ones(2**26, np.uint8)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+keep_freed_memory()
+faults()
+print(faults())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
+def test_an_array_that_is_freed_and_taken_again_costs_no_page_fault():
+    """64 MiB: beyond 32 MiB, arrays come from the system each time unless glibc is told otherwise."""
+    found = subprocess.run([sys.executable, "-c", STEPS], capture_output=True, text=True, check=True)
+    assert int(found.stdout) < 100

@@ -1,7 +1,5 @@
 """The one line that a failure is told in."""
 
-from __future__ import annotations
-
 import pytest
 
 from holobench_eval.core.errors import (

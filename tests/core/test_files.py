@@ -1,7 +1,5 @@
 """Files that anybody may have written, read by every command in the same way."""
 
-from __future__ import annotations
-
 import os
 import warnings
 import zipfile

@@ -1,7 +1,5 @@
 """The command that installs a package keeps to the pinned versions, in a clone and where a wheel is installed."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

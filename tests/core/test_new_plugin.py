@@ -1,7 +1,5 @@
 """A method or a dataset costs a file and an entry point, in this package as in any other that is installed."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

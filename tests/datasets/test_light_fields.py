@@ -1,7 +1,5 @@
 """Light fields: what moves in a view, by how much and which way, and that the light of a display moves as it does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ Between ``<!-- board: STUDY: DISPLAY, ... -->`` and ``<!-- /board -->`` stands t
 a gradient step, those of ``reports/performance/timings.json``.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

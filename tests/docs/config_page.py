@@ -1,7 +1,5 @@
 """``docs/config.md`` from the schema of configs: ``python -m tests.docs.config_page`` writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from holobench_eval.commands.schema import study_schema
@@ -9,13 +7,11 @@ from tests.docs.sections import introduction, mappings, section
 
 PAGE = Path(__file__).parents[2] / "docs" / "config.md"
 
-MARK = "<!-- What follows is written by: python -m tests.docs.config_page -->\n"
-
 
 def page() -> str:
     """The text of the page: what stands above the mark, and the tables."""
     schema = study_schema()
-    parts = [introduction(PAGE, MARK), *section("The document", schema, schema["$defs"])]
+    parts = [introduction(PAGE, "config_page"), *section("The document", schema, schema["$defs"])]
     for key, entry in schema["properties"].items():
         for name, inner in mappings(key, entry, schema["$defs"]):
             parts += section(f"`{name}`", inner, schema["$defs"])

@@ -1,17 +1,13 @@
 """``docs/displays.md`` from the schema of displays: ``python -m tests.docs.display_page`` writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-from holobench_eval.core.json_schema import json_schemas, resolved
+from holobench_eval.core.parameters import json_schemas, resolved
 from holobench_eval.display.simulated.maps import KEYS
 from holobench_eval.display.simulated.profile import STAGES, Profile
 from tests.docs.sections import introduction, mappings, section
 
 PAGE = Path(__file__).parents[2] / "docs" / "displays.md"
-
-MARK = "<!-- What follows is written by: python -m tests.docs.display_page -->\n"
 
 
 def page() -> str:
@@ -21,7 +17,7 @@ def page() -> str:
     for name, stage in STAGES.items():
         if name in schema["properties"] and name != "panel":
             schema["properties"][name]["description"] = stage.title
-    parts = [introduction(PAGE, MARK), *section("The document", schema, definitions, units=True)]
+    parts = [introduction(PAGE, "display_page"), *section("The document", schema, definitions, units=True)]
     for key, entry in schema["properties"].items():
         for name, inner in mappings(key, entry, definitions):
             parts += section(f"`{name}`", inner, definitions, _note(key), units=True)

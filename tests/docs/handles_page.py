@@ -1,13 +1,11 @@
 """``docs/handles.md`` from docstrings: ``python -m tests.docs.handles_page`` writes it."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from holobench_eval.core.json_schema import meanings
+from holobench_eval.core.parameters import meanings
 from holobench_eval.display.api import DisplaySpec
 from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.training import TrainingBench
@@ -15,7 +13,6 @@ from tests.docs.sections import introduction
 
 PAGE = Path(__file__).parents[2] / "docs" / "handles.md"
 
-MARK = "<!-- What follows is written by: python -m tests.docs.handles_page -->\n"
 HANDLES = (
     ("In `solve`: a `MeteredDisplay`", "bench", MeteredDisplay),
     ("In `prepare`: a `TrainingBench`", "bench", TrainingBench),
@@ -26,7 +23,7 @@ OWN = {"simulation", "seed", "known", "journal"}  # what the harness and the ora
 
 def page() -> str:
     """The text of the page: what stands above the mark, and a table a handle and one of the optics."""
-    parts = [introduction(PAGE, MARK)]
+    parts = [introduction(PAGE, "handles_page")]
     for title, name, cls in HANDLES:
         fields = [f"| `{name}.{field}` | {_text(text)} |" for field, text in meanings(cls).items() if field not in OWN]
         parts.append("\n".join([f"## {title}\n", "| | |", "|---|---|", *fields, *_members(name, cls), ""]))

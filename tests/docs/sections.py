@@ -1,22 +1,20 @@
 """Keys of a file as a table each mapping, from the JSON schema that checks it."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from holobench_eval.core.json_schema import resolved
-from holobench_eval.core.parameters import allowed
+from holobench_eval.core.parameters import allowed, resolved
 
 LONGEST = 5  # names that a cell lists; of more, holoeval list has them
 
 
-def introduction(page: Path, mark: str) -> str:
-    """What stands on a page above a line, and the line."""
-    return "".join(page.read_text(encoding="utf-8").partition(mark)[:2])
+def introduction(page: Path, module: str) -> str:
+    """What stands on a page above the line that says which module writes the rest, and the line."""
+    mark = f"<!-- What follows is written by: python -m tests.docs.{module} -->\n"
+    return page.read_text(encoding="utf-8").partition(mark)[0] + mark
 
 
 def mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]]:
@@ -43,25 +41,16 @@ def section(title: str, schema: Any, definitions: Any, note: str = "", units: bo
     for name, entry in schema["properties"].items():
         inside = any(True for _ in mappings(name, entry, definitions))
         default = "needed" if name in needed else "below" if inside and entry.get("default") else _default(entry)
-        words = _words(entry, definitions)
-        text = entry["description"]
+        text = entry["description"].replace("None: ", "null: ").replace("|", "\\|")
         unit = re.search(r" ?\[([^\]]+)\]", text) if units else None
         text = text.replace(unit[0], "", 1).strip() if unit else text
-        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, words, default, _text(text)]
+        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, allowed(_short(entry), definitions), default, text]
         yield f"| {' | '.join(cells)} |".replace("  ", " ")
     yield ""
 
 
 def _default(entry: Any) -> str:
     return f"`{json.dumps(entry['default'])}`" if entry.get("default", "") not in ("", [], {}) else ""
-
-
-def _words(entry: Any, definitions: Any) -> str:
-    return allowed(_short(entry), definitions)
-
-
-def _text(text: str) -> str:
-    return text.replace("None: ", "null: ").replace("|", "\\|")
 
 
 def _short(entry: Any) -> Any:

@@ -1,7 +1,5 @@
 """The page on what does not work quotes what the package prints."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

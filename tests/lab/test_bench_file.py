@@ -1,7 +1,5 @@
 """What a bench that exists cannot be is refused at its line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -35,11 +33,7 @@ def test_a_panel_of_equal_steps_or_with_a_table_is_read(tmp_path: Path) -> None:
         ("bits: 8", "bits: 4", ":8:9: levels are written with 8 bits, got 4"),
         ("bits: 8", "bits: 8\n  levels: [0, 100]", ":9:11: the table has 2 entries; a panel of 8 bits has 256"),
         ("bits: 8", "bits: 8\n  blaze: [0.7, 50.3]", ":9:10: no panel shows more than 0.5 cycles a pixel"),
-        (
-            "bits: 8",
-            "bits: 8\ncapture: {exposure: -1}",
-            r":9:21: capture.exposure should be auto, or above 0",
-        ),
+        ("bits: 8", "bits: 8\ncapture: {exposure: -1}", ":9:21: capture.exposure should be auto, or above 0"),
         ("bits: 8", "bits: 8\ncapture: {settle: -1}", r"bench.yaml:9:19: capture.settle should be auto, or 0 to"),
         ("bits: 8", "bits: 8\ncapture: {dark: 64}", r"bench.yaml:9:17: capture: either dark frames"),
         ("bits: 8", "bits: 8\n  linewidth: [1e-9, 1e-9]", ":9:14: there are 2 widths; the panel has 1 wavelengths"),

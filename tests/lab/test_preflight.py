@@ -46,7 +46,7 @@ def check_linearity(exposure=0.02, picture=None, **camera):
         ({"deaf": True}, "automatic gain"),
         ({"dark": 500.0}, "offset"),
         ({"exposure": 1.0}, "of the samples are saturated; shorten"),
-        ({"limits": (0.015, 1.0)}, "needs a factor of eight"),
+        ({"exposures": (0.015, 1.0)}, "needs a factor of eight"),
         ({"gain": 0.0}, "is there"),
     ],
 )

@@ -1,7 +1,5 @@
 """A metric that comes after a study was run: a file beside the package's and a name in the list, as contributors do."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What axe-core finds on a page that a reader with a screen reader or a keyboard could not use."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any

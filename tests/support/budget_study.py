@@ -1,7 +1,5 @@
 """A made-up study of capture budgets: twelve methods of every track on two displays, as records without pictures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 ``python -m tests.support.coverage`` prints the tables of the docs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+import pytest
 import torch
 from torch import Tensor
 
@@ -212,6 +213,15 @@ def install() -> None:
     """Put the fakes where a task calls the physics."""
     for module, name, fake in FAKES:
         setattr(module, name, fake)
+
+
+@contextmanager
+def installed() -> Iterator[None]:
+    """The fakes are there within the context."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name, fake in FAKES:
+            patch.setattr(module, name, fake)
+        yield
 
 
 def fake_work(task: Job) -> list[Record]:

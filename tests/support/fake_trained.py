@@ -1,7 +1,5 @@
 """Plug-ins that are trained, for tests of the machinery: a few captures, and nothing that takes time."""
 
-from __future__ import annotations
-
 import hashlib
 import time
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """A bench for methods that see no camera."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import torch

@@ -1,15 +1,17 @@
 """Made-up photographs of a display: a picture through a known homography, with speckle, vignetting and noise."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from skimage import data
+
+from holobench_eval.metrics import score
+from holobench_eval.testing.grid_poses import corner_points as corners
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -20,6 +22,11 @@ def photograph(name: str, size: tuple[int, int] = (320, 400)) -> Picture:
     picture = np.asarray(getattr(data, name)(), dtype=np.float32) / 255
     colour = picture[..., :3] if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
     return np.ascontiguousarray(cv2.resize(colour, size[::-1], interpolation=cv2.INTER_AREA).transpose(2, 0, 1))
+
+
+def few(*pictures: Any, **options: Any) -> dict[str, float]:
+    """The scores of the two metrics that are quick."""
+    return score(*pictures, **{**options, "metrics": ("psnr", "ssim")})
 
 
 def save(path: Path, picture: Picture) -> None:
@@ -54,11 +61,6 @@ def pose(
     shift = np.eye(3)
     shift[:2, 2] = -low + (size - 1 - (high - low)) * draw.uniform(0.2, 0.8, 2)
     return shift @ place, (int(size[1]), int(size[0]))
-
-
-def corners(shape: tuple[int, int]) -> Array:
-    bottom, right = shape[0] - 1.0, shape[1] - 1.0
-    return np.array([[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]])
 
 
 def mapped(homography: Array, points: Array) -> Array:

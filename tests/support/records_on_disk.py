@@ -1,7 +1,5 @@
 """A report folder with a records.csv of chosen scores and a provenance, for tests of what reads reports."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A report as its readers have it: report.md, then details.md."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -1,7 +1,5 @@
 """A folder of results as somebody hands it in: records.csv, tests.csv, provenance.json and thumbnails."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

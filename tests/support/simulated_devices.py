@@ -1,7 +1,5 @@
 """A panel, its lasers and a camera around the simulated bench, on a clock of their own that nobody has to wait for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -182,7 +180,7 @@ class SimulatedCamera:
     noise: float = 0.0
     colour: bool = False
     deaf: bool = False
-    limits: tuple[float, float] = (1e-5, 10.0)
+    exposures: tuple[float, float] = (1e-5, 10.0)
     failures: int = 0
     frames: int = 0
     name: str = "simulated camera"
@@ -195,16 +193,12 @@ class SimulatedCamera:
     def white(self) -> float:
         return 2.0**self.bits - 1
 
-    @property
-    def exposures(self) -> tuple[float, float]:
-        return self.limits
-
     def expose(self, seconds: float) -> tuple[Counts, float]:
         if self.failures:
             self.failures -= 1
             raise DeviceError("simulated camera: no frame within 1 s")
         self.frames += 1
-        seconds = min(max(seconds, self.limits[0]), self.limits[1])
+        seconds = min(max(seconds, self.exposures[0]), self.exposures[1])
         counts = self._counts(self.scene.light(), 0.01 if self.deaf else seconds)
         self.scene.clock.wait(seconds)
         if not self.colour:
@@ -245,8 +239,9 @@ class Nothing:
 
 def connect(slm: SimulatedSlm, camera: SimulatedCamera, put: Callable[[Any, str, Any], None] = setattr) -> None:
     """Put the devices behind the names that `BENCH` has. put: sets an attribute, such as pytest's for a test."""
-    for name, device in (("SLM_DRIVERS", slm), ("CAMERA_DRIVERS", camera)):
-        known = next(iter(getattr(catalogue, name).values()))
-        driver = replace(known, settings=Nothing, opens=lambda _, device=device: device)
-        put(catalogue, name, {"simulated": driver})
+    drivers = {}
+    for kind, device in (("slm", slm), ("camera", camera)):
+        known = next(iter(catalogue.DRIVERS[kind].values()))
+        drivers[kind] = {"simulated": replace(known, settings=Nothing, opens=lambda _, device=device: device)}
+    put(catalogue, "DRIVERS", drivers)
     put(SwitchedLaser, "select", lambda _, channel: slm.scene.select(channel))

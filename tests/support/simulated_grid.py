@@ -1,7 +1,5 @@
 """Captures with a known warp: a picture as a hologram shows it, speckled, on a sensor of its own pitch and pose."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -9,16 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from holobench_eval.core.seeds import seed
+from tests.support.photographed import mapped
 
 Array = NDArray[np.float64]
 FINER = 3  # samples of the light for each panel pixel
 SUBPIXELS = 2  # samples for each sensor pixel and axis
 MARGIN = 24  # panel pixels around the region
-
-
-def transform(matrix: Array, points: Array) -> Array:
-    mapped = np.column_stack([points, np.ones(len(points))]) @ matrix.T
-    return mapped[:, :2] / mapped[:, 2:]
 
 
 def random(*names: object) -> np.random.Generator:
@@ -39,10 +33,10 @@ class Pose:
         return points + np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1) @ self.bend
 
     def to_sensor(self, points: Array) -> Array:
-        return transform(self.homography, self.bent(points))
+        return mapped(self.homography, self.bent(points))
 
     def to_region(self, points: Array) -> Array:
-        wanted = transform(np.linalg.inv(self.homography), points)
+        wanted = mapped(np.linalg.inv(self.homography), points)
         if not self.bend.any():
             return wanted
         found = wanted

@@ -1,7 +1,5 @@
 """A small made-up study: photographs degraded like captures, with scores, as record dicts and thumbnails."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

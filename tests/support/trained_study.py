@@ -1,7 +1,5 @@
 """Studies with the fake trained methods: their configs, their runs, and what a command line says of them."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from collections.abc import Callable

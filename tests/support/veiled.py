@@ -1,7 +1,5 @@
 """Models of a display with a veil, without training: the one that knows it, a tone curve, and none of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -82,11 +82,7 @@ MISTAKES = [
     ({"padding": 2}, "white field, far", "too little without a band limit"),
     ({"flaw": "wrong sign"}, "direct sum", "wrong sign"),
     ({"forward": turned}, "white field, 96", "turned"),
-    (
-        {"forward": lambda self, field: Written.forward(self, field) * field.numel()},
-        "energy",
-        "right but for a factor of 1.64e+04 ",
-    ),
+    ({"forward": lambda self, field: Written.forward(self, field) * field.numel()}, "energy", "a factor of 1.64e+04 "),
     ({"forward": lambda self, field: self.filtered(field, 0.9 * self.transfer)}, "energy", "a factor of 0.9 "),
     ({"forward": lambda self, field: Written.forward(self, field).roll(1, 1)}, "centring", "(0.00, 1.00) px aside"),
     ({"forward": lambda self, field: Written.forward(self, field).abs()}, "energy", "float"),

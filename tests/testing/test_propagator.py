@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from holobench_eval.commands.conformance import conformance
+from holobench_eval.commands.own.conformance import conformance
 from holobench_eval.core.errors import UserError
 from holobench_eval.testing.propagator import BAND, load_subject
 

@@ -13,26 +13,28 @@ import typer
 
 from ...core.errors import UserError, one_line
 from ...core.installed import as_typed
+from ...core.panels import is_small
 from ..options import Learned
-from . import committed
-from .rerun import rerun_in
+from .rerun import rerun
 
 if TYPE_CHECKING:
     from ...study.definition import Study
 
+NEEDED = ("records.csv", "table.csv")
+
 
 def check(
     folder: Annotated[Path, typer.Argument(help="A report, or a folder of reports.")] = Path("reports"),
-    rerun: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Solve, capture and score N cells of each report again.")
+    rerun_cells: Annotated[
+        int, typer.Option("--rerun", min=0, metavar="N", help="Solve, capture and score N cells of each report again.")
     ] = 0,
     seed: Annotated[int, typer.Option(help="Which cells are drawn for --rerun.")] = 0,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
     """Check that reports still follow from their records; with --rerun, also from their methods."""
     reports, problems = problems_in(folder)
-    if rerun:
-        problems += rerun_in(folder, rerun, seed, artifacts, print)
+    if rerun_cells:
+        problems += rerun_in(folder, rerun_cells, seed, artifacts)
     for problem in problems:
         print(one_line(problem))
     for line in _earlier(folder):
@@ -43,10 +45,10 @@ def check(
 
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
-    """Number of reports (``committed.reports_in``), and a line for all that no longer holds. UserError: no reports."""
+    """Number of reports (``reports_in``), and a line for all that no longer holds. UserError: no reports."""
     from ...study import provenance
 
-    reports = committed.reports_in(folder)
+    reports = reports_in(folder)
     if not reports:
         raise UserError(f"{folder}: no report, and none in its folders (looked for {provenance.FILE})")
     return len(reports), [f"{report}: {problem}" for report in reports for problem in _problems(report)]
@@ -59,7 +61,7 @@ def _earlier(folder: Path) -> Iterator[str]:
     from ...study.identity import parted
 
     versions = Counter[str]()
-    for report in committed.reports_in(folder):
+    for report in reports_in(folder):
         with suppress(UserError):  # what is wrong with its provenance is a problem already
             scores = provenance.read(report).get("scores")
             versions.update(
@@ -75,7 +77,7 @@ def _earlier(folder: Path) -> Iterator[str]:
 
 def _problems(report: Path) -> Iterator[str]:
     try:
-        yield from _changes(report, *committed.read(report))
+        yield from _changes(report, *finished(report))
     except (UserError, OSError) as error:
         yield str(error)
 
@@ -118,3 +120,51 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
             yield f"{name} has the columns of another version; {command}"
         elif again != text:
             yield f"{name} does not follow from records.csv; {command}"
+
+
+def reports_in(folder: Path) -> list[Path]:
+    """The reports of studies in a folder, or the folder itself where it is one."""
+    from ...study import provenance
+
+    if (folder / provenance.FILE).is_file():
+        return [folder]
+    return sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
+
+
+def finished(report: Path) -> tuple[Study, dict[str, Any]]:
+    """The study of a report and its provenance. UserError: the report is not finished, or what of it is missing."""
+    from ...study import provenance
+    from ...study.changes import recorded
+    from ...study.config import load_study
+
+    known = provenance.read(report)
+    lacking = [key for key in ("config", "config_sha256", "profiles", "scores") if key not in known]
+    if lacking:
+        raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
+    config = report / str(known["config"])
+    if "ended" in known and known["ended"] is None:
+        again = f"'holoeval run {config.resolve().name}' goes on with it"
+        raise UserError(f"a run into this folder is in progress, or was stopped before its end; {again}")
+    missing = [name for name in NEEDED if not (report / name).is_file()]
+    if missing:
+        raise UserError(f"{' and '.join(missing)} missing; 'holoeval report' on its config writes them")
+    return load_study(config, recorded(known)), known
+
+
+def rerun_in(folder: Path, count: int, seed: int, artifacts: Path) -> list[str]:
+    """Rerun ``count`` cells of each of ``reports_in``; print what was found, and return a line a fault."""
+    from ...study.executors import executor
+
+    faults = []
+    for report in reports_in(folder):
+        try:
+            study, _ = finished(report)
+            where = executor("auto", None, is_small(study.display.panel))
+            verdict = rerun(report, study, count, seed, artifacts, where)
+        except (UserError, OSError) as error:
+            print(f"{report}: not rerun: {error}")
+            continue
+        for line in (str(verdict), *verdict.notes):
+            print(f"{report}: {line}")
+        faults += [" ".join(f"{report}: {fault}".split()) for fault in verdict.faults]
+    return faults

@@ -51,14 +51,14 @@ def compare(
     if output is not None:
         for name, text in (("compare.md", page.markdown(comparison)), ("compare.csv", page.csv(comparison))):
             write_atomically(output / name, text.encode())
-            console.print(str(output / name), markup=False, highlight=False, soft_wrap=True)
+            console.print(str(output / name), markup=False, soft_wrap=True)
     if fail_on_regression is not None:
         limit = f"{fail_on_regression:g} {comparison.score.unit}".rstrip()
         worse = [f"{row.method} on {row.display}" for row in comparison.regressions(fail_on_regression)]
         lost = [f"{part.method} on {part.display}" for part in comparison.unpaired if part.run == "A"]
         for what, named in ((f"worse by more than {limit}", worse), ("without scores that A has", lost)):
             if named:
-                console.print(f"{what}: {'; '.join(named)}", markup=False, highlight=False, soft_wrap=True)
+                console.print(f"{what}: {'; '.join(named)}", markup=False, soft_wrap=True)
         if worse or lost:
             raise typer.Exit(1)
 
@@ -77,7 +77,7 @@ def _pairs(displays: Sequence[str] | None) -> dict[str, str] | None:
 
 
 def _print(console: Console, part: Part) -> None:
-    console.print(f"\n{part.title}. {part.sentence}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"\n{part.title}. {part.sentence}", markup=False, soft_wrap=True)
     if part.rows:
         table = Table(*map(escape, part.headings))
         for row in part.rows:

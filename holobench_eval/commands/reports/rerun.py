@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import UserError, listed
-from ...core.panels import is_small
 from ..options import thread_count
-from . import committed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,25 +64,6 @@ class Verdict:
             f"{self.cells} cells computed again: {self.reproduced} numbers reproduced, {self.close} within tolerance "
             f"({TOLERANCE_DB:g} dB; {TOLERANCE:g} for other scores), {len(self.faults)} not"
         )
-
-
-def rerun_in(folder: Path, count: int, seed: int, artifacts: Path, write: Callable[[str], None]) -> list[str]:
-    """Rerun ``count`` cells of each of ``committed.reports_in``; write what was found, and return a line a fault."""
-    from ...study.executors import executor
-
-    faults = []
-    for report in committed.reports_in(folder):
-        try:
-            study, _ = committed.read(report)
-            where = executor("auto", None, is_small(study.display.panel))
-            verdict = rerun(report, study, count, seed, artifacts, where)
-        except (UserError, OSError) as error:
-            write(f"{report}: not rerun: {error}")
-            continue
-        for line in (str(verdict), *verdict.notes):
-            write(f"{report}: {line}")
-        faults += [" ".join(f"{report}: {fault}".split()) for fault in verdict.faults]
-    return faults
 
 
 def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, where: Executor) -> Verdict:
@@ -276,14 +255,8 @@ def _judge(
             was, now = (sha256[:12] or "nothing" for sha256 in learned)
             verdict.faults.append(f"{each}: learned state was {was}, is {now}: another artifact")
         for name in scores:
-            if name not in lacking and _is_judged(each.cell, name):
+            if name not in lacking and not name.startswith(MATCHES):
                 _judge_number(each, name, row, verdict)
-
-
-def _is_judged(cell: Cell, name: str) -> bool:
-    from ...report.data.scores import parse
-
-    return not (name.startswith(MATCHES) or (cell.method in FLAT and parse(name).metric in OF_EDGES))
 
 
 def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Verdict) -> None:
@@ -292,7 +265,7 @@ def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Ver
 
     score = parse(name)
     then, now = float(each.row[name]), float(row.get(name, math.nan))
-    if math.isnan(then):
+    if math.isnan(then) or (each.cell.method in FLAT and score.metric in OF_EDGES):
         return
     if rounded(then) == rounded(now):
         verdict.reproduced += 1

@@ -13,15 +13,7 @@ PALETTE, ALPHA = 3, (4, 6)
 SRGB = b"\x01\x0d\x00\x01"  # of cICP: primaries and curve of sRGB, section 11.3.2.6
 # first row and column and steps between them of the pictures that an interlaced one consists of, section 8.1
 WHOLE = ((0, 0, 1, 1),)
-INTERLACED = (
-    (0, 0, 8, 8),
-    (0, 4, 8, 8),
-    (4, 0, 8, 4),
-    (0, 2, 4, 4),
-    (2, 0, 4, 2),
-    (0, 1, 2, 2),
-    (1, 0, 2, 1),
-)
+INTERLACED = ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2), (1, 0, 2, 1))
 
 
 def refuse_short(content: bytes, width: int, height: int) -> None:

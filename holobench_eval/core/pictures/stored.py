@@ -116,7 +116,7 @@ def open_picture(content: bytes, largest: int = LARGEST_PIXELS) -> Stored:
     picture, holds several of them, is larger, or has samples whose meaning is not known here.
     """
     try:
-        if tiff.is_tiff(content):
+        if content[:4] in tiff.SIGNATURES:
             stored = Stored(content, "TIFF", **tiff.facts(content))
             _refuse_large(stored.width, stored.height, largest)
             return stored

@@ -26,11 +26,6 @@ CURVES = (291, 301)  # GrayResponseCurve, TransferFunction: other meanings of th
 tifffile_logger().setLevel("CRITICAL")  # what it says of a damaged file; here that is one line
 
 
-def is_tiff(content: bytes) -> bool:
-    """Whether a file begins as a TIFF does."""
-    return content[:4] in SIGNATURES
-
-
 def facts(content: bytes) -> dict[str, Any]:
     """The fields of a `Stored`. PictureError for samples whose meaning is not known here."""
     with TiffFile(io.BytesIO(content)) as file:

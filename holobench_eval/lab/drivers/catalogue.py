@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
 from ...core.errors import UserError, suggest
 from ...core.installed import installed, installing
 from ...core.schema import checked
-from ..devices import Camera, DeviceError, Slm
+from ..devices import DeviceError
 from .driver import Driver, Kind
 from .worker import line
 
@@ -24,8 +24,7 @@ def drivers_in(modules: Iterable[str], kind: Kind) -> dict[str, Driver[Any]]:
     return {driver.name: driver for driver in listed if driver.kind == kind}
 
 
-SLM_DRIVERS: Mapping[str, Driver[Slm]] = drivers_in(MODULES, "slm")
-CAMERA_DRIVERS: Mapping[str, Driver[Camera]] = drivers_in(MODULES, "camera")
+DRIVERS: Mapping[Kind, dict[str, Driver[Any]]] = {kind: drivers_in(MODULES, kind) for kind in get_args(Kind)}
 
 
 @dataclass(frozen=True)
@@ -43,33 +42,26 @@ class Survey:
     why: str
 
 
-def open_slm(driver: str, params: Mapping[str, Any]) -> Slm:
-    """The panel that ``driver`` opens with ``params``.
+def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
+    """The `Slm` or the `Camera` that ``driver`` opens with ``params``.
 
-    UserError, in one line: an unknown driver or parameter, a wrong value, a package that is missing, no such panel.
+    UserError, in one line: an unknown driver or parameter, a wrong value, a package that is missing, no such device.
     DeviceError: it is there, but does not answer.
     """
-    settings = checked_params("slm", driver, params)
-    return SLM_DRIVERS[driver].opens(settings)
-
-
-def open_camera(driver: str, params: Mapping[str, Any]) -> Camera:
-    """The camera that ``driver`` opens with ``params``; errors as ``open_slm``."""
-    settings = checked_params("camera", driver, params)
-    return CAMERA_DRIVERS[driver].opens(settings)
+    settings = checked_params(kind, driver, params)
+    return DRIVERS[kind][driver].opens(settings)
 
 
 def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
     """The settings of a driver, without opening anything, so that a bench file is refused before any device moves."""
-    drivers: Mapping[str, Driver[Any]] = SLM_DRIVERS if kind == "slm" else CAMERA_DRIVERS
-    if driver not in drivers:
-        raise UserError(f"unknown {kind} driver '{driver}'; {suggest(driver, drivers)}")
-    return checked(drivers[driver].settings, dict(params), f"{kind} driver '{driver}'")
+    if driver not in DRIVERS[kind]:
+        raise UserError(f"unknown {kind} driver '{driver}'; {suggest(driver, DRIVERS[kind])}")
+    return checked(DRIVERS[kind][driver].settings, dict(params), f"{kind} driver '{driver}'")
 
 
 def survey() -> list[Survey]:
     """Every driver, what it needs, and which devices answer to it. Never raises."""
-    return [_survey(driver) for driver in (*SLM_DRIVERS.values(), *CAMERA_DRIVERS.values())]
+    return [_survey(driver) for drivers in DRIVERS.values() for driver in drivers.values()]
 
 
 def _survey(driver: Driver[Any]) -> Survey:
@@ -81,8 +73,6 @@ def _survey(driver: Driver[Any]) -> Survey:
     try:
         devices = tuple(driver.answering())
         why = "" if devices else driver.unlisted or "none answers; is it on?"
-    except (UserError, DeviceError) as error:
-        why = str(error)
-    except Exception as error:  # a library that is installed but broken
-        why = line(error)
+    except Exception as error:  # of ours, or of a library that is installed but broken
+        why = str(error) if isinstance(error, UserError | DeviceError) else line(error)
     return Survey(driver.kind, driver.name, version, devices, why)

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from statistics import fmean
 from typing import Any
 
 from ...core.errors import UserError
@@ -78,7 +79,7 @@ class Gphoto2Camera:
 
     def close(self) -> None:
         """Give the camera back to the desktop."""
-        self._worker.stop(CAPTURING, self._close)
+        self._worker.stop(CAPTURING, lambda: self._camera and self._camera.exit())
 
     def _open(self) -> None:
         gp, settings = self._gp, self._settings
@@ -175,10 +176,6 @@ class Gphoto2Camera:
         widget.set_value(choice)
         self._camera.set_single_config(config, widget)
 
-    def _close(self) -> None:
-        if self._camera is not None:
-            self._camera.exit()
-
 
 def list_cameras() -> list[str]:
     """``Canon EOS Rebel T6i at usb:001,004`` for every camera that answers; UserError without the package."""
@@ -233,16 +230,12 @@ def exact(speeds: Iterable[float]) -> dict[float, float]:
     """
     written = list(speeds)
     stops = [math.log2(time) for time in written]
-    spread = {parts: _spread([stop * parts for stop in stops]) for parts in (1, 2, 3)}
+    # rms distance from whole numbers
+    spread = {n: math.sqrt(fmean((n * stop - round(n * stop)) ** 2 for stop in stops)) for n in (1, 2, 3)}
     parts = min(spread, key=lambda part: spread[part])
     if spread[parts] > LARGEST_SPREAD:
         return {time: time for time in written}
     return {time: 2.0 ** (round(stop * parts) / parts) for time, stop in zip(written, stops, strict=True)}
-
-
-def _spread(values: list[float]) -> float:
-    """RMS distance from whole numbers."""
-    return math.sqrt(sum((value - round(value)) ** 2 for value in values) / max(len(values), 1))
 
 
 DRIVERS = (Driver("camera", "gphoto2", Gphoto2Settings, Gphoto2Camera, "gphoto2", "gphoto2", list_cameras),)

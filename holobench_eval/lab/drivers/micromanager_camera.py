@@ -57,7 +57,7 @@ class MicromanagerCamera:
 
     def close(self) -> None:
         """Give every device of the configuration back."""
-        self._worker.stop(READING, self._close)
+        self._worker.stop(READING, lambda: self._core and self._core.unloadAllDevices())
 
     def _open(self, settings: MicromanagerSettings) -> None:
         self._core = core = _core()
@@ -121,10 +121,6 @@ class MicromanagerCamera:
         frame = np.asarray(core.getImage())
         check_counts(self.name, frame, self.white)
         return frame[..., :3].copy() if frame.ndim == 3 else frame.copy(), real
-
-    def _close(self) -> None:
-        if self._core is not None:
-            self._core.unloadAllDevices()
 
 
 def list_installations() -> list[str]:

@@ -84,7 +84,7 @@ class OpencvCamera:
 
     def close(self) -> None:
         """Give the camera back."""
-        self._worker.stop(READING, self._close)
+        self._worker.stop(READING, lambda: self._capture and self._capture.release())
 
     def _open(self) -> None:
         import cv2
@@ -155,10 +155,6 @@ class OpencvCamera:
         elif frame.size == rows * columns:  # OpenCV gives what it does not convert with an axis too many, or as bytes
             frame = frame.reshape(rows, columns)
         return np.ascontiguousarray(frame), value / 1e4 if linux else 2.0**value
-
-    def _close(self) -> None:
-        if self._capture is not None:
-            self._capture.release()
 
 
 def list_cameras() -> list[str]:

@@ -21,7 +21,7 @@ from annotated_types import MinLen
 from ...core.errors import UserError, suggest
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .driver import Driver, check_counts, check_levels, import_package
+from .driver import Driver, Kind, check_counts, check_levels, import_package
 from .worker import Worker, closed_on_failure, line
 
 Hardware = Literal["slms", "cameras"]
@@ -172,25 +172,14 @@ def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
         raise UserError(f"device '{device}' cannot be built with these arguments: {line(error)}") from error
 
 
+def _driver(kind: Kind, hardware: Hardware, cls: type[Any], words: str, example: str) -> Driver[Any]:
+    why = f"slmsuite does not look for {words}: give the class of yours as device, such as {example}"
+    return Driver(
+        kind, "slmsuite", SlmsuiteSettings, cls, "slmsuite", "slmsuite", lambda: classes(hardware) and [], why
+    )
+
+
 DRIVERS = (
-    Driver(
-        "slm",
-        "slmsuite",
-        SlmsuiteSettings,
-        SlmsuiteSlm,
-        "slmsuite",
-        "slmsuite",
-        lambda: classes("slms") and [],
-        "slmsuite does not look for panels: give the class of yours as device, such as holoeye.Holoeye",
-    ),
-    Driver(
-        "camera",
-        "slmsuite",
-        SlmsuiteSettings,
-        SlmsuiteCamera,
-        "slmsuite",
-        "slmsuite",
-        lambda: classes("cameras") and [],
-        "slmsuite does not look for cameras: give the class of yours as device, such as thorlabs.ThorCam",
-    ),
+    _driver("slm", "slms", SlmsuiteSlm, "panels", "holoeye.Holoeye"),
+    _driver("camera", "cameras", SlmsuiteCamera, "cameras", "thorlabs.ThorCam"),
 )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from ...core.io import write_atomically, write_png
 from ...imaging.convention import Levels
 from ..dark import Dark, given_dark
 from ..photograph import Photograph, Request, plane_of
+from ..preflight import EXPOSURES
 from .checks import Series, check_present, check_series
 from .frames import Facts, Frame, Plane, facts, find, read_frame
 from .manifest import (
@@ -27,6 +29,7 @@ from .manifest import (
     CHECKS,
     DARK,
     FIDUCIAL,
+    HOLOGRAM,
     LETTER,
     PATTERNS,
     REPEAT,
@@ -41,7 +44,8 @@ from .manifest import (
     read_manifest,
     write_manifest,
 )
-from .order import Showing, check_showings, ordered
+
+BETWEEN_REPEATS = 24  # holograms between two showings of the repeated pattern
 
 
 class FolderPhotographer:
@@ -329,3 +333,50 @@ def _checks_readme(patterns: int) -> str:
 2. Save each under the name in 'save_photograph_as'.
 3. holoeval session import says whether camera and panel are as they should be, a line each.
 """
+
+
+@dataclass(frozen=True)
+class Showing:
+    """A request at its place in a round. request: None for a dark frame; exposure: of that, relative."""
+
+    role: str
+    request: Request | None
+    copy: int = 0
+    exposure: float = 1.0
+
+
+def ordered(
+    requests: Sequence[Request], repeated: Request, seed: str, exposures: Sequence[float], dark: bool
+) -> Iterator[Showing]:
+    """The showings of a round.
+
+    Dark frames, where ``dark``, first and last, at the shortest and at the longest of the round's relative
+    ``exposures``, since stray light and dark current grow with the time and an offset does not; then the fiducial
+    holograms; then everything else in a random order that ``seed`` names, since a slow drift must not favour the
+    methods that are shown first; and one hologram of the fiducial grid, ``repeated``, at the beginning, every so often,
+    and at the end.
+    """
+    copies, spread = iter(range(1_000_000)), sorted({min(exposures), max(exposures)}) if dark else []
+    yield from (Showing(DARK, None, 0, exposure) for exposure in spread)
+    yield Showing(REPEAT, repeated, next(copies))
+    yield from (Showing(FIDUCIAL, request) for request in requests if request.role == FIDUCIAL)
+    mixed = [request for request in requests if request.role == HOLOGRAM]
+    random.Random(seed).shuffle(mixed)
+    for index, request in enumerate(mixed):
+        if index and index % BETWEEN_REPEATS == 0:
+            yield Showing(REPEAT, repeated, next(copies))
+        yield Showing(HOLOGRAM, request)
+    yield Showing(REPEAT, repeated, next(copies))
+    yield from (Showing(DARK, None, 1, exposure) for exposure in spread)
+
+
+def check_showings(fixed_exposure: bool) -> list[tuple[str, float]]:
+    """Role and relative exposure of what checks the bench, in the order of showing.
+
+    Dark frames at the ends of the exposures; the letter at the longest, which chooses the samples that linearity is
+    measured on; the letter at all; the letter with the other sign. A camera with one exposure cannot show linearity.
+    """
+    if fixed_exposure:
+        return [(DARK, 1.0), (LETTER, 1.0), (REVERSED, 1.0)]
+    ends = [(DARK, exposure) for exposure in (min(EXPOSURES), max(EXPOSURES))]
+    return [*ends, (LETTER, 1.0), *((LETTER, exposure) for exposure in EXPOSURES), (REVERSED, 1.0)]

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from ...core.errors import UserError
+from ...core.files import read_regular
 from ...optics.colour import srgb_decode
 from ..counts import read_counts, step
 from .manifest import SUFFIXES, inside
@@ -86,9 +87,7 @@ def _endings(path: Path) -> list[Path]:
 
 def read_frame(path: Path, colour: int) -> Frame:
     """A photograph; of a colour camera's three channels the one of index ``colour``. UserError for a bad file."""
-    if path.stat().st_size > LARGEST_FILE:
-        raise UserError(f"{path}: larger than {LARGEST_FILE >> 20} MiB, no photograph")
-    content = path.read_bytes()
+    content = read_regular(path, LARGEST_FILE)
     sha256 = hashlib.sha256(content).hexdigest()
     frame = read_counts(content, path, linear=True, upright=False, largest=MOST_PIXELS)
     if frame.values.dtype.kind == "f":

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import groupby
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -98,8 +97,10 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[
     manifest, faults, alike = photographer.manifest, list[str](), list[str]()
     for number in range(1, manifest.rounds + 1):
         patterns = [pattern for pattern in manifest.of_round(number) if pattern.role != DARK]
-        seen, wanted = {}, {}
-        for (target, _), group in _by_target(patterns):
+        seen, wanted, groups = {}, {}, dict[tuple[str, int], list[Pattern]]()
+        for pattern in patterns:
+            groups.setdefault((pattern.target, pattern.colour), []).append(pattern)
+        for (target, _), group in sorted(groups.items()):
             grains = []
             for pattern in group:
                 light, wished = _rectified(bench, photographer, pattern), predicted(bench, photographer, pattern)
@@ -112,13 +113,3 @@ def misplaced(bench: RealBench, photographer: FolderPhotographer) -> tuple[list[
     pairs = f"{len(alike)} pair(s) of photographs of one target cannot be told apart, and may have changed places"
     named = "; ".join(alike[:LISTED]) + (" and others" if len(alike) > LISTED else "")
     return shortened(faults), f"order: {pairs}: {named}" if alike else ""
-
-
-def _by_target(patterns: Sequence[Pattern]) -> Iterator[tuple[tuple[str, int], list[Pattern]]]:
-    """Patterns by target and colour; those that are not scored by colour."""
-
-    def kind(pattern: Pattern) -> tuple[str, int]:
-        return pattern.target, pattern.colour
-
-    for key, group in groupby(sorted(patterns, key=kind), kind):
-        yield key, list(group)

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, Len, MaxLen, MinLen
 
 from ...core.errors import CellError, UserError
+from ...core.files import read_text
 from ...core.io import write_atomically
 from ...core.schema import FieldError, checked
 from ...imaging.convention import Convention
@@ -139,8 +140,6 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / FILE
     if not path.is_file() or path.is_symlink():
         raise UserError(f"{path}: no such file; holoeval session export makes a session folder")
-    if path.stat().st_size > LARGEST_MANIFEST:
-        raise UserError(f"{path}: larger than {LARGEST_MANIFEST // 2**20} MB; not a manifest that holoeval wrote")
     content = _json(path)
     version = content.get("format") if isinstance(content, dict) else None
     if version != FORMAT:
@@ -164,7 +163,7 @@ def _json(path: Path) -> Any:
         raise ValueError(f"{name} is no number")
 
     try:
-        return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+        return json.loads(read_text(path, LARGEST_MANIFEST), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: not JSON ({str(error)[:100]})") from None
 

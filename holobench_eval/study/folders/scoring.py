@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...core.allocator import return_large_arrays
+from ...core.device import return_large_arrays
 from ...core.errors import CellError
 from ...core.hashing import digest
 from ...core.io import write_atomically

@@ -1,7 +1,5 @@
 """``holoeval report`` where the folder of records is not there, as in a fresh clone."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -7,33 +7,36 @@ import zlib
 import numpy as np
 import pytest
 import tifffile
+import torch
 from PIL import Image, ImageCms
 
 from holobench_eval.core.errors import PictureError
+from holobench_eval.core.io import write_png
 from holobench_eval.core.pictures import open_picture
+from tests.core.pictures.test_matrix import written
 
 PIXELS = np.random.default_rng(3).integers(0, 256, (40, 50, 3), dtype=np.uint8)
 IMAGE = Image.fromarray(PIXELS)
-
-
-def written(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
-    file = io.BytesIO()
-    image.save(file, kind, **options)
-    return file.getvalue()
 
 
 def chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
+def png(data: bytes, width: int, height: int, bits: int, colour: int, interlaced: bool) -> bytes:
+    """A PNG of these rows."""
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlaced))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b"")
+
+
 def with_chunk(kind: bytes, content: bytes) -> bytes:
     """A PNG with one more chunk behind its header."""
-    png = written(IMAGE)
+    png = written(IMAGE, "PNG")
     return png[:33] + chunk(kind, content) + png[33:]
 
 
 def test_a_decoder_prints_nothing_of_a_png(capfd: pytest.CaptureFixture[str]) -> None:
-    good = written(IMAGE)
+    good = written(IMAGE, "PNG")
     assert open_picture(with_chunk(b"iCCP", b"a\0\0")).values().shape == (40, 50, 3)
     at = good.index(b"IEND") - 8  # the checksum of the pixels
     with pytest.raises(PictureError, match="damaged: a checksum of the PNG is wrong"):
@@ -81,15 +84,11 @@ def test_a_png_of_any_depth_has_its_full_scale_and_all_its_rows(bits: int | str,
     parts = [values[top::down, left::right] for top, left, down, right in steps] if interlaced else [values]
     rows = b"".join(packed(part) for part in parts)
 
-    def png(data: bytes) -> bytes:
-        header = chunk(b"IHDR", struct.pack(">IIBBBBB", 16, 9, bits, colour, 0, 0, interlaced))
-        return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b"")
-
-    read = open_picture(png(rows)).upright()
+    read = open_picture(png(rows, 16, 9, bits, colour, interlaced)).upright()
     top = 65535 if bits == 16 else 255
     assert np.array_equal(read, values * (top // (2**bits - 1)))
     with pytest.raises(PictureError, match="rows of the PNG are missing"):
-        open_picture(png(rows[:-1]))
+        open_picture(png(rows[:-1], 16, 9, bits, colour, interlaced))
 
 
 def test_a_png_says_by_its_chunks_what_its_values_mean() -> None:
@@ -118,6 +117,26 @@ def test_a_profile_is_read_in_every_format(form: str) -> None:
         else:
             with pytest.raises(PictureError, match="ICC colour profile is 'Lab"):
                 stored.refuse_other_colours(linear=True)
+    with pytest.raises(PictureError, match="cannot be read"):
+        open_picture(written(IMAGE, form, icc_profile=b"no profile")).refuse_other_colours()
+
+
+@pytest.mark.parametrize("form", ["PNG", "JPEG", "TIFF", "BMP", "WEBP"])
+@pytest.mark.parametrize("kept", [0.05, 0.9])
+def test_a_truncated_file_is_refused(form: str, kept: float) -> None:
+    content = written(IMAGE, form)
+    with pytest.raises(PictureError) as caught:
+        open_picture(content[: int(len(content) * kept)]).values()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("size", [(1, 64_000_000), (7999, 8000), (60000, 60000)])
+def test_a_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None if size == (60000, 60000) else Image.MAX_IMAGE_PIXELS)
+    with pytest.raises(PictureError, match="million"):
+        open_picture(png(bytes(1000), *size, 8, 2, False))
 
 
 def test_loss_is_told_by_the_content_and_not_by_the_name() -> None:
@@ -135,3 +154,14 @@ def test_a_small_tiff_that_claims_a_huge_image_is_refused_before_it_is_decoded()
             content.pages.first.tags[tag].overwrite(60_000)
     with pytest.raises(PictureError, match="60000 x 60000 pixels; expected at most 33 million"):
         open_picture(file.getvalue())
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("bits", [8, 16])
+def test_levels_of_a_png_come_back_as_they_were_written(tmp_path, channels, bits):
+    kind = np.uint8 if bits == 8 else np.uint16
+    levels = np.random.default_rng(0).integers(0, 2**bits, (channels, 6, 5), dtype=np.int64)
+    write_png(tmp_path / "a.png", torch.from_numpy(levels), bits)
+    decoded = open_picture((tmp_path / "a.png").read_bytes()).values()
+    assert decoded.dtype == kind
+    assert np.array_equal(decoded, levels[0] if channels == 1 else levels.transpose(1, 2, 0))

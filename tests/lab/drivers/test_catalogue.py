@@ -12,14 +12,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import installing
 from holobench_eval.lab.drivers import catalogue as drivers
-from holobench_eval.lab.drivers.catalogue import (
-    CAMERA_DRIVERS,
-    SLM_DRIVERS,
-    checked_params,
-    open_camera,
-    open_slm,
-    survey,
-)
+from holobench_eval.lab.drivers.catalogue import DRIVERS, checked_params, open_device, survey
 
 MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
 OPENCV = {"device": 0, "resolution": [64, 48]}
@@ -50,14 +43,10 @@ def test_importing_the_drivers_imports_none_of_their_packages() -> None:
 def test_a_wrong_bench_file_is_one_line_before_any_device_moves(
     kind: Any, driver: str, params: dict[str, Any], message: str
 ) -> None:
-    for check in (lambda: checked_params(kind, driver, params), lambda: _open(kind, driver, params)):
+    for check in (lambda: checked_params(kind, driver, params), lambda: open_device(kind, driver, params)):
         with pytest.raises(UserError, match=message) as caught:
             check()
         assert "\n" not in str(caught.value)
-
-
-def _open(kind: str, driver: str, params: dict[str, Any]) -> Any:
-    return open_slm(driver, params) if kind == "slm" else open_camera(driver, params)
 
 
 @pytest.mark.parametrize(
@@ -71,13 +60,13 @@ def _open(kind: str, driver: str, params: dict[str, Any]) -> Any:
     ],
 )
 def test_a_missing_package_is_told_with_the_command_that_installs_it(
-    monkeypatch: pytest.MonkeyPatch, kind: str, driver: str, params: dict[str, Any], package: str, extra: str
+    monkeypatch: pytest.MonkeyPatch, kind: Any, driver: str, params: dict[str, Any], package: str, extra: str
 ) -> None:
     _hide(monkeypatch, package)
     if package == "rawpy":
         pytest.importorskip("gphoto2")
     with pytest.raises(UserError, match=re.escape(installing(extra=extra))):
-        _open(kind, driver, params)
+        open_device(kind, driver, params)
 
 
 def _hide(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
@@ -89,9 +78,8 @@ def _hide(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
 def test_every_driver_is_listed_with_its_version_and_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     listed = survey()
-    assert [(entry.kind, entry.driver) for entry in listed] == [("slm", name) for name in SLM_DRIVERS] + [
-        ("camera", name) for name in CAMERA_DRIVERS
-    ]
+    known = [(kind, name) for kind, drivers in DRIVERS.items() for name in drivers]
+    assert [(entry.kind, entry.driver) for entry in listed] == known
     assert all(entry.devices or entry.why for entry in listed)
     assert all("\n" not in entry.why for entry in listed)
     opencv = next(entry for entry in listed if entry.driver == "opencv")
@@ -106,7 +94,7 @@ def test_looking_for_devices_survives_broken_packages(monkeypatch: pytest.Monkey
     def broken() -> list[str]:
         raise OSError("libusb\nis missing")
 
-    for table in (SLM_DRIVERS, CAMERA_DRIVERS):
+    for table in DRIVERS.values():
         for name, driver in list(table.items()):
-            monkeypatch.setitem(table, name, replace(driver, answering=broken))  # type: ignore[arg-type]
+            monkeypatch.setitem(table, name, replace(driver, answering=broken))
     assert {entry.why for entry in survey()} == {"OSError: libusb is missing"}

@@ -10,8 +10,9 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.drivers.catalogue import open_camera
+from holobench_eval.lab.drivers.catalogue import open_device
 from holobench_eval.lab.drivers.gphoto2_camera import Gphoto2Camera, Gphoto2Settings, list_cameras
+from tests.support.bayer import bayer_dng
 
 MOSAIC = np.random.default_rng(4).integers(0, 16383, (64, 96), dtype=np.uint16)
 MODEL = "Nikon DSC D750"  # which the virtual camera claims to be
@@ -30,7 +31,7 @@ def card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[bytes], o
 
 
 @pytest.fixture
-def raw(card: Callable[[bytes], None], bayer_dng: Callable[..., bytes]) -> bytes:
+def raw(card: Callable[[bytes], None]) -> bytes:
     """A RAW file in the virtual camera."""
     data = bayer_dng(MOSAIC)
     card(data)
@@ -38,7 +39,7 @@ def raw(card: Callable[[bytes], None], bayer_dng: Callable[..., bytes]) -> bytes
 
 
 def test_counts_of_the_photosites_arrive_at_the_nearest_speed_whose_time_is_told(raw: bytes) -> None:
-    camera = open_camera("gphoto2", {"model": MODEL})
+    camera = open_device("camera", "gphoto2", {"model": MODEL})
     try:
         assert camera.name.startswith(MODEL)
         assert camera.white == 16383

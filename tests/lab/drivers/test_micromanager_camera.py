@@ -9,7 +9,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import Camera, DeviceError
-from holobench_eval.lab.drivers.catalogue import open_camera
+from holobench_eval.lab.drivers.catalogue import open_device
 
 CONFIG = """
 Property,Core,Initialize,0
@@ -30,7 +30,7 @@ def params(tmp_path: Path) -> dict[str, Any]:
 
 @pytest.fixture
 def camera(params: dict[str, Any]) -> Iterator[Camera]:
-    camera = open_camera("micromanager", {**params, "properties": {"PixelType": "16bit", "BitDepth": "12"}})
+    camera = open_device("camera", "micromanager", {**params, "properties": {"PixelType": "16bit", "BitDepth": "12"}})
     yield camera
     camera.close()
 
@@ -56,8 +56,8 @@ def test_fresh_counts_are_low_justified_with_the_white_of_the_bit_depth_and_the_
 
 
 def test_a_colour_camera_gives_red_green_blue(params: dict[str, Any]) -> None:
-    camera = open_camera(
-        "micromanager", {**params, "properties": {"PixelType": "32bitRGB", "Mode": "Color Test Pattern"}}
+    camera = open_device(
+        "camera", "micromanager", {**params, "properties": {"PixelType": "32bitRGB", "Mode": "Color Test Pattern"}}
     )
     frame, _ = camera.expose(0.01)
     camera.close()
@@ -67,7 +67,7 @@ def test_a_colour_camera_gives_red_green_blue(params: dict[str, Any]) -> None:
 
 def test_floating_point_frames_are_refused(params: dict[str, Any]) -> None:
     with pytest.raises(UserError, match="no 8 or 16 bit counts"):
-        open_camera("micromanager", {**params, "properties": {"PixelType": "32bit"}})
+        open_device("camera", "micromanager", {**params, "properties": {"PixelType": "32bit"}})
 
 
 @pytest.mark.parametrize(
@@ -83,11 +83,11 @@ def test_floating_point_frames_are_refused(params: dict[str, Any]) -> None:
 )
 def test_what_is_wrong_in_the_bench_file_is_one_line(params: dict[str, Any], change: dict, message: str) -> None:
     with pytest.raises(UserError, match=message) as caught:
-        open_camera("micromanager", {**params, **change})
+        open_device("camera", "micromanager", {**params, **change})
     assert "\n" not in str(caught.value)
 
 
 def test_a_damaged_configuration_is_one_line(params: dict[str, Any]) -> None:
     Path(params["config"]).write_text("Device,Cam,NoSuchLibrary,DCam\n")
     with pytest.raises(UserError, match=r"^driver 'micromanager': .*bench.cfg: [^\n]+$"):
-        open_camera("micromanager", params)
+        open_device("camera", "micromanager", params)

@@ -8,7 +8,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.drivers.catalogue import open_slm
+from holobench_eval.lab.drivers.catalogue import open_device
 from holobench_eval.lab.drivers.slmsuite_devices import SlmsuiteCamera
 
 pytest.importorskip("slmsuite", reason="slmsuite is not installed: pip install --no-deps slmsuite h5py tqdm")
@@ -20,7 +20,7 @@ LEVELS = np.random.default_rng(6).integers(0, 256, SHAPE, dtype=np.uint8)
 
 @pytest.fixture
 def slm() -> Iterator[Any]:
-    slm = open_slm("slmsuite", PANEL)
+    slm = open_device("slm", "slmsuite", PANEL)
     yield slm
     slm.close()
 
@@ -60,7 +60,7 @@ def test_a_panel_that_alters_levels_is_found_out(slm: Any, monkeypatch: pytest.M
 
 def test_a_panel_of_ten_bits_is_refused() -> None:
     with pytest.raises(UserError, match="takes 10 bits, not 8"):
-        open_slm("slmsuite", {**PANEL, "arguments": {**PANEL["arguments"], "bitdepth": 10}})
+        open_device("slm", "slmsuite", {**PANEL, "arguments": {**PANEL["arguments"], "bitdepth": 10}})
 
 
 def test_the_camera_sees_what_the_panel_shows(slm: Any, camera: SlmsuiteCamera) -> None:
@@ -111,12 +111,12 @@ def test_frames_are_not_added_up_whatever_the_camera_is_set_to_and_it_needs_boun
 @pytest.mark.filterwarnings("ignore:Holoeye SDK")
 def test_what_cannot_be_opened_is_one_line(device: str, message: str) -> None:
     with pytest.raises(UserError, match=message) as caught:
-        open_slm("slmsuite", {"device": device})
+        open_device("slm", "slmsuite", {"device": device})
     assert "\n" not in str(caught.value)
 
 
 def test_nothing_is_written_to_the_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
-    slm = open_slm("slmsuite", PANEL)
+    slm = open_device("slm", "slmsuite", PANEL)
     slm.show(LEVELS)
     slm.close()
     assert capsys.readouterr().out == ""

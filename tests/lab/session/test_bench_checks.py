@@ -1,7 +1,5 @@
 """The checks of a live bench, made on the photographs of a session: one line each, and no score where one fails."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -9,19 +7,12 @@ from holobench_eval.lab.session.manifest import CHECKS, read_manifest
 from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
-STUDY = """\
-title: Checked first
-display: {profiles: [leto-mild], panel: [144, 144]}
-targets: {dataset: photographs, params: {count: 1}}
-methods: [double_phase]
-protocol: {metrics: [psnr]}
-"""
 LAB = ("leto-mild", (144, 144), 4)
 LATER = ("leto-mild", (144, 144), 5)  # another noise
 
 
 def test_checks_come_before_any_score_and_may_be_photographed_again_until_they_pass(tmp_path: Path) -> None:
-    session = exported(tmp_path, STUDY)
+    session = exported(tmp_path, "double_phase", "leto-mild")
     Lab(*LAB).photograph_round(session, 1)
     for sign, gamma, words in (
         (-1, 1.0, "nothing was scored. phase convention: .* set phase.sign: -1"),
@@ -46,7 +37,7 @@ def test_checks_come_before_any_score_and_may_be_photographed_again_until_they_p
 
 
 def test_a_camera_with_one_exposure_checks_the_sign_alone(tmp_path: Path) -> None:
-    folder = exported(tmp_path, STUDY, "--fixed-exposure")
+    folder = exported(tmp_path, "double_phase", "leto-mild", "--fixed-exposure")
     roles = [each.role for each in read_manifest(folder).of_round(CHECKS)]
     assert roles == [role for role in ("dark", "letter", "reversed") for _ in range(3)]
     Lab(*LATER).photograph_checks(folder)

@@ -13,7 +13,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session.folder import FolderPhotographer
 from holobench_eval.lab.session.manifest import CHECKS
 from tests.lab.session.running import exported
-from tests.lab.session.test_bench_checks import LAB, STUDY
+from tests.lab.session.test_bench_checks import LAB
 from tests.support.photographing import Lab
 
 PROFILE = Path(profiles.__file__).parent / "profiles" / "leto-mild.yaml"
@@ -26,7 +26,7 @@ def test_given_dark_counts_stand_for_dark_frames(tmp_path: Path, kind: str) -> N
     if kind == "file of the bench":
         np.save(tmp_path / "my dark.npy", np.full(lab.bench.response.shape[-2:], DARK, np.float32))
         options = described(tmp_path, capture={"dark_frames": 0, "dark": "my dark.npy"})
-    folder = exported(tmp_path, STUDY, *options)
+    folder = exported(tmp_path, "double_phase", "leto-mild", *options)
     for name in ("round-1", "checks"):
         rows = list(csv.DictReader((folder / "patterns" / name / "order.csv").read_text().splitlines()))
         assert {row["laser"] for row in rows} == {"on"}
@@ -54,7 +54,7 @@ def test_given_dark_counts_go_before_those_of_the_bench_file_whatever_the_files_
         (tmp_path / name).parent.mkdir(exist_ok=True)
         np.save(tmp_path / name, np.full((100, 100), level, np.uint16))
     options = described(tmp_path, capture={"dark_frames": 0, "dark": "dark.npy"})
-    folder = exported(tmp_path, STUDY, *options, "--dark", tmp_path / "new" / "dark.npy")
+    folder = exported(tmp_path, "double_phase", "leto-mild", *options, "--dark", tmp_path / "new" / "dark.npy")
     assert FolderPhotographer(folder).dark_of(1, 0).bias.mean() == 80
 
 
@@ -69,7 +69,7 @@ def test_photographs_on_another_scale_than_the_given_dark_counts_are_a_fault(
     tmp_path: Path, ending: str, dark: np.generic, line: str
 ) -> None:
     np.save(tmp_path / "dark.npy", np.full((100, 100), dark))
-    folder = exported(tmp_path, STUDY, *described(tmp_path), "--dark", tmp_path / "dark.npy")
+    folder = exported(tmp_path, "double_phase", "leto-mild", *described(tmp_path), "--dark", tmp_path / "dark.npy")
     photographer, draw = FolderPhotographer(folder), np.random.default_rng(0)
     for pattern in photographer.manifest.of_round(CHECKS):
         counts = draw.integers(0, 250, (100, 100)).astype(np.uint16) * (1 if ending == ".jpg" else 256)

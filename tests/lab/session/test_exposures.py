@@ -1,7 +1,5 @@
 """Frames of one exposure through the files of a session: several patterns, one photograph, the score of the display."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -9,12 +7,10 @@ from pathlib import Path
 import cv2
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session import read_manifest
-from tests.lab.session.running import exported, told
+from tests.lab.session.running import exported, succeed, told
 from tests.support.photographing import Lab
 
 PROFILE = """\
@@ -24,14 +20,10 @@ version: 1
 description: leto-mild with a fast panel.
 panel: {frames: 4, wavelengths: [5.17e-7]}
 """
-STUDY = """\
-title: Frames
-display: {profiles: [fast.yaml], panel: [128, 128]}
-targets: {dataset: photographs, params: {count: 1}}
-methods: [{name: random_frames, label: four, params: {frames: 4, iterations: 5}}, {name: random_frames, label: one, \
-params: {iterations: 5}}]
-protocol: {metrics: [psnr]}
-"""
+METHODS = (
+    "{name: random_frames, label: four, params: {frames: 4, iterations: 5}}, "
+    "{name: random_frames, label: one, params: {iterations: 5}}"
+)
 
 
 def psnr(report: Path) -> pd.Series:
@@ -40,7 +32,7 @@ def psnr(report: Path) -> pd.Series:
 
 def test_frames_are_photographed_once_and_score_as_on_the_display_itself(tmp_path: Path) -> None:
     (tmp_path / "fast.yaml").write_text(PROFILE)
-    folder = exported(tmp_path, STUDY, "--dark", 900)
+    folder = exported(tmp_path, METHODS, "fast.yaml", "--dark", 900, panel=128)
     rows = list(csv.DictReader((folder / "patterns" / "round-1" / "order.csv").read_text().splitlines()))
     several = [row for row in rows if " " in row["show"]]
     assert len(several) == 1
@@ -55,10 +47,8 @@ def test_frames_are_photographed_once_and_score_as_on_the_display_itself(tmp_pat
     assert f"{others[0]}: is not the pattern that was exported" in told("import", folder, *study)[1]
     cv2.imwrite(str(folder / others[0]), levels)
 
-    _, failure = told("import", folder, *study)
-    assert not failure
-    done = CliRunner().invoke(app, ["run", str(study[1]), "--output", str(tmp_path / "direct"), "--executor", "serial"])
-    assert done.exit_code == 0, done.exception
+    succeed("session", "import", folder, *study)
+    succeed("run", study[1], "--output", tmp_path / "direct", "--executor", "serial")
     ours, direct = psnr(folder / "report"), psnr(tmp_path / "direct")
     for label in ("four", "one"):
         assert ours[label] == pytest.approx(direct[label], abs=0.7)  # means over pixels, samples at points
@@ -70,7 +60,7 @@ def test_frames_are_photographed_once_and_score_as_on_the_display_itself(tmp_pat
 
 def test_a_manifest_with_another_name_for_a_frame_is_refused(tmp_path: Path) -> None:
     (tmp_path / "fast.yaml").write_text(PROFILE)
-    folder = exported(tmp_path, STUDY, "--dark", 900)
+    folder = exported(tmp_path, METHODS, "fast.yaml", "--dark", 900, panel=128)
     content = json.loads((folder / "manifest.json").read_text())
     shared = next(pattern for pattern in content["patterns"] if pattern["frames"])
     shared["frames"].reverse()

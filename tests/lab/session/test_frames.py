@@ -7,6 +7,7 @@ from PIL import Image
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.session.frames import facts, find, read_frame
+from tests.support.bayer import bayer_dng
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def test_twelve_bits_at_the_upper_end_have_steps_of_sixteen(tmp_path, counts):
     assert facts(read_frame(tmp_path / "0001.png", 0)).step == 1
 
 
-def test_camera_raw_gives_the_sites_of_its_colour(tmp_path, bayer_dng):
+def test_camera_raw_gives_the_sites_of_its_colour(tmp_path):
     mosaic = np.tile(np.array([[100, 200], [200, 300]], np.uint16), (16, 16))
     (tmp_path / "0001.dng").write_bytes(bayer_dng(mosaic))
     seen = [read_frame(tmp_path / "0001.dng", colour).counts for colour in range(3)]

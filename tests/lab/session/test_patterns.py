@@ -1,7 +1,5 @@
 """What a session's patterns hold on a panel with a correction map and three lasers, here and where the folder goes."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -14,14 +12,8 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.lab.session import read_manifest
 from tests.lab.session.running import told
+from tests.study.studies import write_study
 
-STUDY = """\
-title: Patterns
-display: {bench: bench.yaml}
-targets: {dataset: charts, params: {names: [tv_lines]}}
-methods: [double_phase]
-protocol: {metrics: [psnr]}
-"""
 BENCH = """\
 name: corrected
 version: 1
@@ -32,10 +24,11 @@ FLAT = np.random.default_rng(0).integers(0, 256, (96, 96)).astype(np.uint8)
 
 
 def exported(folder: Path, bench: str, session: str = "session") -> tuple[Path, str]:
-    (folder / "study.yaml").write_text(STUDY)
+    targets = "{dataset: charts, params: {names: [tv_lines]}}"
+    config = write_study(folder / "study.yaml", "double_phase", display="{bench: bench.yaml}", targets=targets)
     (folder / "bench.yaml").write_text(bench)
     cv2.imwrite(str(folder / "flat.bmp"), FLAT)
-    return folder / session, " ".join(told("export", folder / "study.yaml", folder / session))
+    return folder / session, " ".join(told("export", config, folder / session))
 
 
 def test_patterns_have_a_full_turn_for_each_laser_and_the_map_that_travels_with_them(tmp_path: Path) -> None:
@@ -65,10 +58,7 @@ def test_patterns_have_a_full_turn_for_each_laser_and_the_map_that_travels_with_
         ("{two_pi_level: [311, 256]}", "bench.yaml:4:8: phase: two_pi_level: 2 levels for 3 colours"),
         ("{two_pi_level: [311, 0, 256]}", "bench.yaml:4:29: phase.two_pi_level[1]: 0 is no level of a full turn"),
         ("{two_pi_level: [2.1, 1.9, 1.7]}", "two_pi_level[0]: 2.1 is no level of a full turn; expected 8 to 65536"),
-        (
-            "{correction: {file: flat.bmp, two_pi_level: 8}}",
-            "levels from 0 to 255, which are 32 turns; set correction.two_pi_level to the level of this uint8 map",
-        ),
+        ("{correction: {file: flat.bmp, two_pi_level: 8}}", "levels from 0 to 255, which are 32 turns; set correction"),
         ("{correction: {file: gone.bmp}}", "gone.bmp: no such file"),
         ("{correction: {file: ../up.bmp}}", "does not travel with a session; put it beside this file"),
     ],

@@ -1,35 +1,20 @@
 """The same photographs give the same number, whether a session imports them or ``holoeval score`` reads them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from holobench_eval.commands import app
 from holobench_eval.core.hashing import digest
 from holobench_eval.lab.session import read_manifest, session_photographer
 from holobench_eval.optics.colour import srgb_encode
 from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import displays
+from tests.lab.session.running import succeed
+from tests.study.studies import write_study
 from tests.support.photographing import Lab
-
-STUDY = """\
-title: Seen two ways
-display: {profiles: [leto-mild], panel: [208, 208]}
-targets: {dataset: photographs, params: {count: 1}}
-methods: [{name: wirtinger, params: {iterations: 20}}]
-protocol: {metrics: [psnr, ssim]}
-"""
-
-
-def run(*arguments: object) -> None:
-    done = CliRunner().invoke(app, list(map(str, arguments)))
-    assert done.exit_code == 0, (done.output, done.exception)
 
 
 def save(path: Path, picture: np.ndarray) -> None:
@@ -51,14 +36,15 @@ def lay_out(session: Path, folder: Path) -> None:
 
 
 def test_import_and_score_give_the_same_number_for_the_same_photographs(tmp_path: Path) -> None:
-    session = tmp_path / "bench"
-    (tmp_path / "study.yaml").write_text(STUDY)
-    run("session", "export", tmp_path / "study.yaml", session)
+    session, display = tmp_path / "bench", "{profiles: [leto-mild], panel: [208, 208]}"
+    method, scores = "{name: wirtinger, params: {iterations: 20}}", "{metrics: [psnr, ssim]}"
+    config = write_study(tmp_path / "study.yaml", method, display=display, protocol=scores)
+    succeed("session", "export", config, session)
     Lab("leto-mild", (208, 208), seed=1).photograph_round(session, 1)
-    run("session", "import", session)
+    succeed("session", "import", session)
     lay_out(session, tmp_path)
     pictures = ("--captures", tmp_path / "captures", "--targets", tmp_path / "targets")
-    run("score", *pictures, "--output", tmp_path / "scored", "--values", "linear")
+    succeed("score", *pictures, "--output", tmp_path / "scored", "--values", "linear")
     imported, scored = (
         pd.read_csv(folder / "table.csv").set_index("label").loc["wirtinger"]
         for folder in (session / "report", tmp_path / "scored")

@@ -1,7 +1,5 @@
 """A panel whose phase has the other sign than stated is named where no fiducial grid is found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,18 +9,10 @@ from holobench_eval.display.simulated.pipeline import SimulatedBench
 from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
-STUDY = """\
-title: Wrong way round
-display: {{profiles: [{profile}], panel: [144, 144]}}
-targets: {{dataset: photographs, params: {{count: 1}}}}
-methods: [double_phase]
-protocol: {{metrics: [psnr]}}
-"""
-
 
 def refused(folder: Path, profile: str, lab: Lab) -> str:
     """The one line with which the import of photographs from a lab ends."""
-    session = exported(folder, STUDY.format(profile=profile))
+    session = exported(folder, "double_phase", profile)
     lab.photograph_round(session, 1)
     return told("import", session)[1]
 

@@ -1,7 +1,5 @@
 """Photographs of one target that changed places are found by the grain of each hologram, or said to be too alike."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +11,10 @@ from holobench_eval.lab.session.checks import check_swaps, grain
 from tests.lab.session.running import exported, told
 from tests.support.photographing import Lab
 
-STUDY = """\
-title: Three methods
-display: {profiles: [leto-2020], panel: [144, 144]}
-targets: {dataset: photographs, params: {count: 1}}
-methods: [double_phase, {name: wirtinger, params: {iterations: 30}}, {name: wirtinger, label: rough, params: \
-{iterations: 30, initial_phase: random}}]
-protocol: {metrics: [psnr]}
-"""
+METHODS = (
+    "double_phase, {name: wirtinger, params: {iterations: 30}}, "
+    "{name: wirtinger, label: rough, params: {iterations: 30, initial_phase: random}}"
+)
 
 
 def swap(first: Path, second: Path) -> None:
@@ -30,7 +24,7 @@ def swap(first: Path, second: Path) -> None:
 
 
 def test_each_swap_of_two_methods_is_named_in_one_line_and_no_honest_pair_is(tmp_path: Path) -> None:
-    folder = exported(tmp_path, STUDY, "--dark", 900)
+    folder = exported(tmp_path, METHODS, "leto-2020", "--dark", 900)
     Lab("leto-2020", (144, 144), seed=5).photograph_round(folder, 1)
     shown = [pattern for pattern in read_manifest(folder).patterns if pattern.target]
     pairs = []

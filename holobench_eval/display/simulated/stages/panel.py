@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from annotated_types import Interval, Len
 from torch import Tensor
 
-from ....core.units import Check, Metres
+from ....core.schema import Check, Metres
 from ....optics.phase import TAU, gray_level, wrap
 from ...api import DisplaySpec, Plane, Region
 from ..stage import Effect, Stage

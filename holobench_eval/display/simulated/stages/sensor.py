@@ -15,7 +15,7 @@ from annotated_types import Interval
 from torch import Tensor
 
 from ....core.compiled import usable
-from ....core.units import Metres
+from ....core.schema import Metres
 from ....imaging.shifts import correlate
 from ....optics.blocks import in_blocks
 from ....optics.linear import linear

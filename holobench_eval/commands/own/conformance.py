@@ -13,11 +13,11 @@ def conformance(
     ] = None,
 ) -> None:
     """Check the optics and the registration, or your own propagator: against direct integration, over random poses."""
-    from ..testing.propagation_conformance import main as check_optics
-    from ..testing.propagator import load_subject
+    from ...testing.propagation_conformance import main as check_optics
+    from ...testing.propagator import load_subject
 
     if propagator is not None:
         raise typer.Exit(check_optics({propagator: load_subject(propagator)}))
-    from ..testing.registration_conformance import main as check_registration
+    from ...testing.registration_conformance import main as check_registration
 
     raise typer.Exit(max(check_optics(), check_registration()))

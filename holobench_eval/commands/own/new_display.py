@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import UserError
+from ...core.errors import UserError
 from .new_method import write_new
 
 STARTS_AS = "ideal"  # whose panel the file has until it is changed
@@ -29,7 +29,7 @@ def new_display(
     folder: Annotated[Path, typer.Option(help="Where to write NAME.yaml.")] = Path(),
 ) -> None:
     """Write the file of a display, every key explained."""
-    from ..display.simulated.profile import names
+    from ...display.simulated.profile import names
 
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise UserError(f"'{name}' is no name for a display; use letters, digits, - and _, such as 'my-display'")
@@ -41,9 +41,9 @@ def new_display(
 
 def display_text(name: str) -> str:
     """The text of a new display's file: what it needs as values, all else as comments with their defaults."""
-    from ..core.parameters import parameters
-    from ..display import load_profile
-    from ..display.simulated.profile import STAGES, Profile
+    from ...core.parameters import parameters
+    from ...display import load_profile
+    from ...display.simulated.profile import STAGES, Profile
 
     panel = vars(load_profile(STARTS_AS).panel)
     own = {"name": name, "version": 1, "seed": 0, "description": "A display of my own."}

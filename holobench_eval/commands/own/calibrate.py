@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import UserError
-from .options import RESULTS
-from .options import Profile as ProfileName
+from ...core.errors import UserError
+from ..options import RESULTS
+from ..options import Profile as ProfileName
 
 
 def calibrate(
@@ -27,11 +27,11 @@ def calibrate(
     if draws is not None:
         _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
         return
-    from ..display import load_profile
-    from ..study.calibration import load_calibration
-    from ..study.calibration.fitting import Fitting
-    from ..study.progress import watching
-    from .output import console
+    from ...display import load_profile
+    from ...study.calibration import load_calibration
+    from ...study.calibration.fitting import Fitting
+    from ...study.progress import watching
+    from ..output import console
 
     screen = console()
     loaded = load_profile(profile)
@@ -39,9 +39,7 @@ def calibrate(
     if (output, workers) != (None, None):
         raise UserError("--output and --workers go with --draws")
     with watching(screen) as watch:
-        fitting = Fitting(
-            profile, loaded, calibration, watch, lambda line: screen.print(line, highlight=False, soft_wrap=True)
-        )
+        fitting = Fitting(profile, loaded, calibration, watch, lambda line: screen.print(line, soft_wrap=True))
         values, network = fitting.fit()
         psnr = fitting.captured(values)
     rows, columns = calibration.panel
@@ -57,12 +55,12 @@ def calibrate(
 
 def _family(name: str, draws: int, folder: Path, workers: int | None) -> None:
     """Draw displays, resuming what the folder has; write the report and the profiles that are kept."""
-    from ..report.family import write_family
-    from ..study.calibration.family import compute, load_family
-    from ..study.calibration.posterior import members, middle, write_member
-    from ..study.executors import executor
-    from ..study.progress import SECONDS_BETWEEN_LINES, duration
-    from .output import console
+    from ...report.family import write_family
+    from ...study.calibration.family import compute, load_family
+    from ...study.calibration.posterior import members, middle, write_member
+    from ...study.executors import executor
+    from ...study.progress import SECONDS_BETWEEN_LINES, duration
+    from ..output import console
 
     family, screen, began, last = load_family(name), console(), time.monotonic(), 0.0
 

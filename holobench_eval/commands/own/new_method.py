@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import UserError
+from ...core.errors import UserError
 
 
 def new_method(

@@ -1,0 +1,1 @@
+"""Commands for methods, displays and propagators of one's own."""
