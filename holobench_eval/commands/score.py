@@ -88,10 +88,10 @@ def score_folders(
     from ..lab.dark import given_dark
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
-    from ..study import provenance
     from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import Scoring, described
+    from ..study.running import provenance
     from ..study.store import Store
 
     if values not in VALUES:
@@ -167,7 +167,7 @@ def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
 @contextmanager
 def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
     """Show every step by its name: a bar on a terminal, else a line every few seconds."""
-    from ..study.progress import SECONDS_BETWEEN_LINES
+    from ..study.running.progress import SECONDS_BETWEEN_LINES
 
     if console.is_terminal:
         text = TextColumn("{task.description}", markup=False)

@@ -14,7 +14,7 @@ from holobench_eval.display import load_profile
 from holobench_eval.study.calibration import Calibration, Prediction, load_calibration, names
 from holobench_eval.study.calibration.fitting import NEAR, TRAININGS, Fitting
 from holobench_eval.study.definition import Targets
-from holobench_eval.study.progress import Lines
+from holobench_eval.study.running.progress import Lines
 
 FREE = {"zero_order.fraction": (0.05, 0.35), "zero_order.phase": (-3.1, 3.1)}
 SMALL = Calibration(

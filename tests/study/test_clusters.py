@@ -17,10 +17,10 @@ from typing import Any
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study import run as running
 from holobench_eval.study import store
 from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
+from holobench_eval.study.running import run as running
 from tests.study.test_executors import compute, untimed
 from tests.support.fake_study import fake_work, write_config
 

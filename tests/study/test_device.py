@@ -12,11 +12,12 @@ import torch
 from holobench_eval.commands import main
 from holobench_eval.core.device import CPU, repeatable
 from holobench_eval.report.sections.setup import environment
-from holobench_eval.study import cost, provenance
+from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial, executor
 from holobench_eval.study.executors.local import one_gpu
 from holobench_eval.study.plan import plan
+from holobench_eval.study.running import provenance
 from tests.study.studies import write_study
 from tests.study.test_run import compute
 from tests.support import trained_study

@@ -17,8 +17,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import executors
-from holobench_eval.study import run as running
 from holobench_eval.study.executors import Executor, Local, Serial, executor, processes
+from holobench_eval.study.running import run as running
 from tests.study import test_run
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE

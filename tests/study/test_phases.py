@@ -15,7 +15,7 @@ from holobench_eval.study.cost import Cost
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
 from holobench_eval.study.plan import plan
-from holobench_eval.study.run import Outcome
+from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
 from tests.study.studies import exchanged
 from tests.study.test_identity import write_profile

@@ -12,8 +12,8 @@ from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.executors import Serial
-from holobench_eval.study.progress import Lines, duration, watching
-from holobench_eval.study.run import run
+from holobench_eval.study.running.progress import Lines, duration, watching
+from holobench_eval.study.running.run import run
 from holobench_eval.study.store import Record, Store
 from tests.study.test_run import compute
 from tests.support.fake_study import write_config

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
+from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from holobench_eval.study.versions import HARNESS
 from tests.study.test_run import compute

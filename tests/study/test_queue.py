@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.study.queue import DRAWING_SECONDS, Queue
+from holobench_eval.study.running.queue import DRAWING_SECONDS, Queue
 
 
 @dataclass(frozen=True)

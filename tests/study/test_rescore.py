@@ -14,11 +14,12 @@ import pytest
 from holobench_eval.display import CalibratedBench
 from holobench_eval.report import layout_of, records_frame
 from holobench_eval.report.data.tables import difference
-from holobench_eval.study import cost, provenance
+from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import Cell, plan
-from holobench_eval.study.run import Outcome
+from holobench_eval.study.running import provenance
+from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
 from tests.support import another_metric, trained_study
 from tests.support.another_metric import COLUMN, NAME

@@ -12,14 +12,14 @@ from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.core.pictures import open_picture
 from holobench_eval.report import Results, layout_of, records_frame
-from holobench_eval.study import provenance
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import Plan, plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import Outcome, run
+from holobench_eval.study.running import provenance
+from holobench_eval.study.running.progress import Lines
+from holobench_eval.study.running.run import Outcome, run
 from holobench_eval.study.store import Store
 from tests.support.fake_study import solves, untimed, write_config
 

@@ -17,13 +17,13 @@ import torch
 
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.study import cost
-from holobench_eval.study import run as running
 from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local
 from holobench_eval.study.executors.processes import start
 from holobench_eval.study.phases import phases_of, start_of
 from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.running import run as running
 from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import test_run

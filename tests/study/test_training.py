@@ -17,8 +17,8 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.executors.processes import start
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Follower, Lines
-from holobench_eval.study.run import run
+from holobench_eval.study.running.progress import Follower, Lines
+from holobench_eval.study.running.run import run
 from holobench_eval.study.training import TrainingJob
 from tests.support import fake_study
 from tests.support.patience import PATIENCE

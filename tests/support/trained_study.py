@@ -17,8 +17,8 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import Preparation
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import Outcome, run
+from holobench_eval.study.running.progress import Lines
+from holobench_eval.study.running.run import Outcome, run
 from tests.support import fake_trained
 
 CONFIG = """\

@@ -44,7 +44,7 @@ def check(
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
     """Number of reports (``committed.reports_in``), and a line for all that no longer holds. UserError: no reports."""
-    from ...study import provenance
+    from ...study.running import provenance
 
     reports = committed.reports_in(folder)
     if not reports:
@@ -55,8 +55,8 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
 def _earlier(folder: Path) -> Iterator[str]:
     """A line for each other version of the protocol by which reports were scored; they stand as they are."""
     from ...metrics.protocol import VERSION as PROTOCOL
-    from ...study import provenance
     from ...study.identity import parted
+    from ...study.running import provenance
 
     versions = Counter[str]()
     for report in committed.reports_in(folder):
@@ -86,7 +86,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     from ...study.displays import displays
     from ...study.identity import parted, versions
     from ...study.plan import plan
-    from ...study.provenance import text_digest
+    from ...study.running.provenance import text_digest
 
     for display in displays(study).values():
         now = {"version": display.version, "sha256": display.digest}

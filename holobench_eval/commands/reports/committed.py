@@ -15,7 +15,7 @@ NEEDED = ("records.csv", "table.csv")
 
 def reports_in(folder: Path) -> list[Path]:
     """The reports of studies in a folder, or the folder itself where it is one."""
-    from ...study import provenance
+    from ...study.running import provenance
 
     if (folder / provenance.FILE).is_file():
         return [folder]
@@ -24,9 +24,9 @@ def reports_in(folder: Path) -> list[Path]:
 
 def read(report: Path) -> tuple[Study, dict[str, Any]]:
     """The study of a report and its provenance. UserError: the report is not finished, or what of it is missing."""
-    from ...study import provenance
     from ...study.changes import recorded
     from ...study.config import load_study
+    from ...study.running import provenance
 
     known = provenance.read(report)
     lacking = [key for key in ("config", "config_sha256", "profiles", "scores") if key not in known]

@@ -27,8 +27,9 @@ from ...lab.photograph import MOST_SATURATED
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
-from .. import identity, provenance
+from .. import identity
 from ..plan import FLOORS, REFERENCE
+from ..running import provenance
 from ..scoring.pictures import write_thumbnail
 from ..store import Record, Scores, Store
 from ..versions import ALIGNMENT, HARNESS

@@ -28,8 +28,8 @@ from ..displays import condition, displays
 from ..executors import Serial
 from ..opening import forget_sessions, open_display
 from ..plan import plan
-from ..progress import Lines
-from ..run import Outcome, run
+from ..running.progress import Lines
+from ..running.run import Outcome, run
 from .files import named
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
-from .artifacts import read_log
-from .plan import Task
-from .store import Record
-from .training import WAITS
+from ..artifacts import read_log
+from ..plan import Task
+from ..store import Record
+from ..training import WAITS
 
 SECONDS_BETWEEN_LINES = 5.0
 SHARE = "share"  # of all steps of a training, in its log

@@ -7,30 +7,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..core.device import find, gpu_name
-from ..core.errors import StopError, UserError
-from ..core.errors import reason as one_line
-from ..core.hashing import canonical, digest
-from ..display.traits import traits_of
-from ..metrics import catalogue
-from . import cost, isolation, provenance
-from .artifacts import Artifacts
-from .definition import Study
-from .displays import Preparation
-from .executors import Executor, Serial
-from .executors.clusters import Address
-from .executors.local import Local
-from .executors.remaining import Kind, Remaining
-from .phases import Phases, phases_of
-from .plan import Cell, Plan
+from ...core.device import find, gpu_name
+from ...core.errors import StopError, UserError
+from ...core.errors import reason as one_line
+from ...core.hashing import canonical, digest
+from ...display.traits import traits_of
+from ...metrics import catalogue
+from .. import cost, isolation
+from ..artifacts import Artifacts
+from ..definition import Study
+from ..displays import Preparation
+from ..executors import Executor, Serial
+from ..executors.clusters import Address
+from ..executors.local import Local
+from ..executors.remaining import Kind, Remaining
+from ..phases import Phases, phases_of
+from ..plan import Cell, Plan
+from ..scoring import starts
+from ..scoring.cell import work
+from ..scoring.job import Job, Setting
+from ..scoring.scores import is_kept
+from ..store import Record, Store, appears, late
+from ..training import TrainingJob, train
+from . import provenance
 from .progress import Lines
 from .queue import Drawing, Queue, Step
-from .scoring import starts
-from .scoring.cell import work
-from .scoring.job import Job, Setting
-from .scoring.scores import is_kept
-from .store import Record, Store, appears, late
-from .training import TrainingJob, train
 
 Result = str | list[Record] | None  # of a training the reason of its failure, empty for success; of a task its records
 

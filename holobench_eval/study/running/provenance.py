@@ -12,16 +12,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import UserError
-from ..core.files import read_text
-from ..core.installed import __version__, installed
-from ..core.io import now, write_atomically
-from . import isolation
-from .changes import noted
-from .cost import cpu_model
-from .definition import Study
-from .plan import Plan
-from .versions import HARNESS
+from ...core.errors import UserError
+from ...core.files import read_text
+from ...core.installed import __version__, installed
+from ...core.io import now, write_atomically
+from .. import isolation
+from ..changes import noted
+from ..cost import cpu_model
+from ..definition import Study
+from ..plan import Plan
+from ..versions import HARNESS
 
 PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless", "scikit-image", "kornia", "torchmetrics")
 FILE = "provenance.json"

@@ -7,8 +7,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 
-from .scoring.job import Job
-from .training import TrainingJob
+from ..scoring.job import Job
+from ..training import TrainingJob
 
 DRAWING, DRAWING_SECONDS = "", 3.0  # the label of drawings, and about what one takes
 QUICK = 1.0  # s of a job that may as well be the last one
