@@ -126,26 +126,8 @@ def run(
             refuse_untrained(plan, left.missing, learned)
         store.remove(left.outdated)  # at once, so that a run that is killed does not take them for new
         watch.planned(len(plan.cells), len(left.wanted), plan.floors)
-        described = provenance.read(output)
-        if left.missing or described.get("config_sha256") != provenance.text_digest(study.text):
-            gpu = gpu_name(find(device)) if isinstance(executor, Serial | Local) else ""  # else it is another machine's
-            described = provenance.describe(study, plan, output, threads, executor.workers, device, gpu)
-            described = provenance.begin(output, described, resumed=len(left.missing) < len(plan.cells))
-        elif left.scorable:
-            described = provenance.restate(output, study, plan)
-        setting = Setting(
-            output=output,
-            folder=study.folder,
-            artifacts=artifacts,
-            save=study.save,
-            metrics=metrics,
-            lpips_weights=study.protocol.lpips_weights,
-            threads=threads,
-            workers=executor.workers,
-            device=device,
-            isolation=study.isolation,
-            limits=study.limits,
-        )
+        setting = _setting(study, output, artifacts, metrics, threads, executor.workers, device)
+        described = _begun(study, plan, left, setting, executor)
         # With nothing to do no worker need be started.
         solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
@@ -153,6 +135,36 @@ def run(
         states = store.states(tuple(left.unscored.values()), metrics=metrics, folder=study.folder)
         rescored = sum(state != "unscored" for state in states.values())
         return Outcome(store.load(plan), described, len(left.missing), solved, rescored, len(states) - rescored)
+
+
+def _setting(
+    study: Study, output: Path, artifacts: Path, metrics: Mapping[str, str], threads: int, workers: int, device: str
+) -> Setting:
+    """What every worker is told of the run."""
+    return Setting(
+        output=output,
+        folder=study.folder,
+        artifacts=artifacts,
+        save=study.save,
+        metrics=metrics,
+        lpips_weights=study.protocol.lpips_weights,
+        threads=threads,
+        workers=workers,
+        device=device,
+        isolation=study.isolation,
+        limits=study.limits,
+    )
+
+
+def _begun(study: Study, plan: Plan, left: _Left, setting: Setting, executor: Executor) -> dict[str, Any]:
+    """The provenance, written as a run begins that computes something or has another config; else that from before."""
+    output, described = setting.output, provenance.read(setting.output)
+    if left.missing or described.get("config_sha256") != provenance.text_digest(study.text):
+        is_here = isinstance(executor, Serial | Local)  # else the GPU is another machine's
+        gpu = gpu_name(find(setting.device)) if is_here else ""
+        described = provenance.describe(study, plan, output, setting.threads, setting.workers, setting.device, gpu)
+        return provenance.begin(output, described, resumed=len(left.missing) < len(plan.cells))
+    return provenance.restate(output, study, plan) if left.scorable else described
 
 
 @dataclass(frozen=True)
@@ -216,12 +228,7 @@ def _compute(
 ) -> int:
     """Train what the missing cells still need, then compute and score. Returns how many phases were solved."""
     artifacts, store = Artifacts(setting.artifacts), Store(setting.output)
-    untrained = _untrained(plan, left.missing, artifacts)
-    if untrained:
-        names = [(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained]
-        anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
-        watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
-    trainings = [TrainingJob(preparation, setting) for preparation in untrained]
+    trainings = [TrainingJob(preparation, setting) for preparation in _announced(plan, left, artifacts, watch)]
     single = executor.workers == 1 and not isinstance(executor, Address)  # whose workers come and go
     jobs = list(_jobs(plan, left, single, setting))
     if single:  # one of each method first, so that the time left is known soon
@@ -254,6 +261,16 @@ def _compute(
     return solved
 
 
+def _announced(plan: Plan, left: _Left, artifacts: Artifacts, watch: Lines) -> list[Preparation]:
+    """What has to be trained, after the watch was told."""
+    untrained = _untrained(plan, left.missing, artifacts)
+    if untrained:
+        names = [(preparation.name, artifacts.folder_of(preparation)) for preparation in untrained]
+        anew = {preparation.name: artifacts.outdated(preparation) for preparation in untrained}
+        watch.training(names, [f"{name} is trained anew: {reason}" for name, reason in anew.items() if reason])
+    return untrained
+
+
 def forget(plan: Plan, store: Store, phases: Phases, artifacts: Artifacts) -> None:
     """Remove what was learned for a plan, and the phases and records that depend on it."""
     for preparation in plan.preparations().values():
@@ -273,13 +290,11 @@ def refuse_untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) 
 def _untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> list[Preparation]:
     """The missing artifacts that missing cells need; existing artifacts are checked before any computation."""
     wanted = {identity for cell in plan.cells if cell.id in missing for identity in cell.prepared}
-    waiting = []
-    for preparation in plan.preparations().values():
-        if preparation.id in wanted:
-            if artifacts.has(preparation):
-                artifacts.load(preparation)
-            else:
-                waiting.append(preparation)
+    needed = [preparation for name, preparation in plan.preparations().items() if name in wanted]
+    waiting = [preparation for preparation in needed if not artifacts.has(preparation)]
+    for preparation in needed:
+        if preparation not in waiting:
+            artifacts.load(preparation)
     return waiting
 
 
@@ -315,10 +330,8 @@ def _refuse_unseen(records: list[Record], store: Store) -> None:
     until = late()
     for record in records:
         if not appears(store.path(record.id), until):
-            raise UserError(
-                f"a worker has written a record that is not in {store.folder.absolute()}; workers have to see this "
-                "folder under the same name"
-            )
+            where = f"that is not in {store.folder.absolute()}; workers have to see this folder under the same name"
+            raise UserError(f"a worker has written a record {where}")
 
 
 def _error(result: Result | Exception) -> Exception:
