@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory, read_log
 from holobench_eval.study.displays import Preparation
 from tests.support.trained_study import (
     artifact_of,
@@ -228,7 +228,7 @@ def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path
         memory.log(row)
     for again in ({"round": 1, "step": 10, "l1": 0.25}, {"round": 1, "fidelity": 21.0}):
         memory.log(again)
-    rows = [{key: value for key, value in row.items() if value} for row in memory.rows()]
+    rows = [{key: value for key, value in row.items() if value} for row in read_log(tmp_path)]
     assert rows == [
         {"round": "1", "step": "10", "l1": "0.25"},
         {"round": "1", "fidelity": "21"},

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.study.artifacts import PROVENANCE, FolderMemory, progress
+from holobench_eval.study.artifacts import PROVENANCE, progress, read_log
 from holobench_eval.study.phases import phases_of
 from holobench_eval.study.store import Store
 from tests.study.test_run import compute
@@ -87,7 +87,7 @@ def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_that_is
     (tmp_path / "dark").unlink()
     assert compute_trained(config, retry_failed=True).failed == 0
     assert captures(config) == 3
-    assert [row["captures"] for row in FolderMemory(artifact_of(config)).rows()] == ["1", "3"]
+    assert [row["captures"] for row in read_log(artifact_of(config))] == ["1", "3"]
     compute_trained(config, retrain=True)
     assert captures(config) == 2
 

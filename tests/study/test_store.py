@@ -181,12 +181,12 @@ def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_
     store.write(Record(third.description(), "skipped", "Toy", reason="no camera"))
     store.write(Record(fourth.description(), "done", "Toy", alone=True, scores=psnr(20.0, "v2, 0")))
 
-    def states(*timed: Cell, metrics: Mapping[str, str] | None = None) -> list[str]:
+    def states(*timed: Cell, metrics: Mapping[str, str]) -> list[str]:
         return [*store.states(grid.cells, frozenset(cell.id for cell in timed), metrics).values()]
 
     missing = ["missing"] * len(rest)
-    assert states() == ["failed", "done", "skipped", "done", *missing]
-    assert states(second, third, fourth) == ["failed", "untimed", "skipped", "done", *missing]
+    assert states(metrics={}) == ["failed", "done", "skipped", "done", *missing]
+    assert states(second, third, fourth, metrics={}) == ["failed", "untimed", "skipped", "done", *missing]
     today = {"psnr": identity.versions()["psnr"]}
     assert states(metrics=today) == ["failed", "done", "skipped", "unscored", *missing]
     assert states(second, metrics=today | {"ssim": "v2, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 from holobench_eval.core.io import TEMPORARY
-from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress
+from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress, read_log
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.executors.processes import start
@@ -175,7 +175,7 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     assert known[1]["captures"] == 5
     assert known[0]["description"] == known[1]["description"]
     assert known[0]["seconds"] >= 5 * 0.15 - 0.05  # the rounds before the kill count too
-    logs = [FolderMemory(one).rows() for one in (place, artifact_of(again))]
+    logs = [read_log(one) for one in (place, artifact_of(again))]
     assert [[row["round"] for row in log] for log in logs] == [list("01234")] * 2
     assert [row["gain"] for row in logs[0]] == [row["gain"] for row in logs[1]]
     assert list(place.rglob(f"{TEMPORARY}*")) == []
