@@ -26,7 +26,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from tests.commands import test_moved_session as sessions
-from tests.study.test_rescore import BOTH, ONE, PICTURE, cells, forget
+from tests.study.running.test_rescore import BOTH, ONE, PICTURE, cells, forget
 from tests.support import another_metric
 from tests.support.another_metric import COLUMN, NAME
 from tests.support.trained_study import compute

@@ -8,7 +8,7 @@ import torch
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.fake_study import solves, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")

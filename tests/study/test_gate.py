@@ -10,7 +10,7 @@ import pytest
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.trained_study import needs, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")

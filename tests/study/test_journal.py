@@ -13,7 +13,7 @@ import pytest
 from holobench_eval.study.artifacts import PROVENANCE, progress, read_log
 from holobench_eval.study.phases import phases_of
 from holobench_eval.study.store import Store
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.fake_study import write_config
 from tests.support.trained_study import artifact_of, write
 from tests.support.trained_study import compute as compute_trained

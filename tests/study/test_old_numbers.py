@@ -15,8 +15,8 @@ from holobench_eval.study import isolation
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.phases import RESULTS, Phases
 from holobench_eval.study.versions import method_version
-from tests.study.test_run import TWO
-from tests.study.test_run import compute as compute_with
+from tests.study.studies import TURNS
+from tests.study.studies import compute as compute_with
 from tests.support.trained_study import compute, needs, write
 
 READING = """
@@ -224,7 +224,7 @@ def test_a_phase_is_solved_by_one_at_a_time(tmp_path: Path) -> None:
 
 def test_a_time_that_holds_one_that_was_shared_was_not_taken_alone(tmp_path: Path) -> None:
     config = using(tmp_path, "{name: wirtinger, params: {iterations: 2, offset: none}}")
-    shared = compute_with(config, tmp_path / RESULTS / "a", executor=TWO)
+    shared = compute_with(config, tmp_path / RESULTS / "a", executor=TURNS)
     assert [row["alone"] for row in shared.records if row["label"] == "wirtinger"] == [False]
     config = using(tmp_path, "{name: wirtinger, params: {iterations: 2}}")
     begun = compute(config, f"{RESULTS}/b")

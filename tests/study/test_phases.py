@@ -17,9 +17,8 @@ from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.study.studies import exchanged
+from tests.study.studies import TURNS, compute, exchanged
 from tests.study.test_identity import write_profile
-from tests.study.test_run import TWO, compute
 from tests.support import trained_study
 from tests.support.fake_study import solves, untimed, write_config
 
@@ -163,13 +162,13 @@ def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_run_that_shar
     tmp_path: Path, found: list[str]
 ) -> None:
     results = tmp_path / RESULTS
-    shared = compute(write_study(tmp_path), results / "a", executor=TWO)
+    shared = compute(write_study(tmp_path), results / "a", executor=TURNS)
     config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))
-    alone = compute(config, results / "b", executor=TWO)
+    alone = compute(config, results / "b", executor=TURNS)
     assert found == ["tv_lines", "gray_ramp", "gray_ramp"]
     assert [(record["alone"], record["reused"]) for record in alone.records[-2:]] == [(False, True), (True, False)]
     assert scores(alone) == scores(shared)
-    compute(config, results / "c", executor=TWO)  # what was timed alone once need not be again
+    compute(config, results / "c", executor=TURNS)  # what was timed alone once need not be again
     assert len(found) == 3
 
 

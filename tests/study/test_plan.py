@@ -5,7 +5,7 @@ from pathlib import Path
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
-from tests.study.test_run import add_one_laser, add_other_profile
+from tests.study.studies import add_one_laser, add_other_profile
 from tests.support.fake_study import write_config
 
 

@@ -8,7 +8,7 @@ import pytest
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.test_run import add_other_profile
+from tests.study.studies import add_other_profile
 from tests.support.fake_study import write_config
 
 

@@ -18,7 +18,7 @@ from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running.run import Outcome
 from tests.commands.test_commands import holoeval
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support import trained_study
 from tests.support.fake_study import FAKES, solves, write_config
 

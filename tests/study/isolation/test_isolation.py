@@ -14,8 +14,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.process import process_of
-from tests.study.studies import MILD, TWO, write_study
-from tests.study.test_run import compute
+from tests.study.studies import MILD, TWO, compute, write_study
 from tests.support.patience import PATIENCE
 
 METHODS = '''

@@ -11,7 +11,7 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from holobench_eval.study.versions import HARNESS
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.fake_study import write_config
 
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,27 +15,14 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
-from holobench_eval.study.plan import Plan, plan
+from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.running.progress import Lines
-from holobench_eval.study.running.run import Outcome, run
 from holobench_eval.study.store import Store
+from tests.study.studies import TURNS, add_one_laser, compute
 from tests.support.fake_study import solves, untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
-
-
-def compute(
-    config: Path,
-    output: Path,
-    write: Callable[[str], None] = lambda line: None,
-    executor: Executor | None = None,
-    grid: Plan | None = None,
-    **options: Any,
-) -> Outcome:
-    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder."""
-    study, artifacts = load_study(config), output.parent / "artifacts"
-    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, artifacts, **options)
 
 
 def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path: Path) -> None:
@@ -120,19 +106,6 @@ def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch
     assert outcome.records[0]["reason"] == "the score psnr_linear is nan"
 
 
-def add_other_profile(folder: Path) -> None:
-    from importlib.resources import files
-
-    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
-    (folder / "other.yaml").write_text(text.replace("name: ideal", "name: other"))
-
-
-def add_one_laser(folder: Path) -> None:
-    add_other_profile(folder)
-    text = (folder / "other.yaml").read_text().replace("name: other", "name: one")
-    (folder / "one.yaml").write_text(text.replace("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.32e-7]"))
-
-
 def test_targets_keep_their_pictures_when_displays_change_places(tmp_path: Path) -> None:
     add_one_laser(tmp_path)
     for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
@@ -180,22 +153,18 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytes
     assert [run["ended"] for run in earlier] == [None]
 
 
-TWO = Serial(workers=2)
-"""Says that it has two workers; what they compute takes turns."""
-
-
 def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path: Path) -> None:
     config = write_config(tmp_path)
-    shared = compute(config, tmp_path / "out", executor=TWO)
+    shared = compute(config, tmp_path / "out", executor=TURNS)
     assert [record["alone"] for record in shared.records[-3:]] == [False] * 3
     config.write_text(f"{config.read_text()}timing: alone\n")
     study = load_study(config)
     foreseen = preview(study, plan(study), Store(tmp_path / "out"), threads=1, workers=2)
     assert [(row.done, row.missing) for row in foreseen] == [(18, 0), (2, 1)]
-    alone = compute(config, tmp_path / "out", executor=TWO)
+    alone = compute(config, tmp_path / "out", executor=TURNS)
     assert alone.computed == 1
     assert [record["alone"] for record in alone.records[-3:]] == [False, False, True]
-    assert compute(config, tmp_path / "out", executor=TWO).computed == 0
+    assert compute(config, tmp_path / "out", executor=TURNS).computed == 0
     single = compute(config, tmp_path / "single").records[-3:]
     assert [record["alone"] for record in single] == [True] * 3
 

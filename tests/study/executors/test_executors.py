@@ -19,13 +19,13 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study import executors
 from holobench_eval.study.executors import Executor, Local, Serial, executor, processes
 from holobench_eval.study.running import run as running
-from tests.study import test_run
+from tests.study import studies
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
-    return test_run.compute(config, output, executor=chosen, **options).records
+    return studies.compute(config, output, executor=chosen, **options).records
 
 
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -18,8 +18,7 @@ from holobench_eval.study.executors import Local, Serial, executor
 from holobench_eval.study.executors.local import one_gpu
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
-from tests.study.studies import write_study
-from tests.study.test_run import compute
+from tests.study.studies import compute, write_study
 from tests.support import trained_study
 from tests.support.fake_study import write_config
 

@@ -12,8 +12,7 @@ from PIL import Image
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Plan, plan
-from tests.study.studies import TWO, write_study
-from tests.study.test_run import compute
+from tests.study.studies import TWO, compute, write_study
 
 IDEAL = "{profiles: [ideal], panel: [128, 128]}"
 AGED = "{profiles: [leto-aged], panel: [128, 128]}"

@@ -21,7 +21,7 @@ from holobench_eval.study import store
 from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
 from holobench_eval.study.running import run as running
-from tests.study.test_executors import compute, untimed
+from tests.study.executors.test_executors import compute, untimed
 from tests.support.fake_study import fake_work, write_config
 
 SBATCH = """\
@@ -55,7 +55,7 @@ def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_proces
     config.write_text(f"{config.read_text()}isolation: none\n")
     serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", fake_work)
-    here = str(Path(__file__).parents[2])  # where worker processes find the fake study
+    here = str(Path(__file__).parents[3])  # where worker processes find the fake study
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")

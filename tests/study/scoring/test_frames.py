@@ -10,7 +10,7 @@ import numpy as np
 from holobench_eval.report import layout_of, records_frame
 from holobench_eval.report.data import columns
 from holobench_eval.study.config import load_study
-from tests.study.test_run import compute
+from tests.study.studies import compute
 
 METHOD = """
 import torch

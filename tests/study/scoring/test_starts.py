@@ -26,8 +26,8 @@ from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.running import run as running
 from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
-from tests.study import test_run
-from tests.study.test_run import add_other_profile
+from tests.study import studies
+from tests.study.studies import add_other_profile
 from tests.support.fake_study import FAKES, fake_work, held, install, solves, untimed, write_config
 from tests.support.patience import PATIENCE
 
@@ -51,7 +51,7 @@ def cells(grid: Plan, label: str) -> list[Cell]:
 
 def compute(config: Path, **options: Any) -> list[dict[str, Any]]:
     """The records of a study whose results are in the folder ``out`` beside its config."""
-    return test_run.compute(config, config.parent / "out", **options).records
+    return studies.compute(config, config.parent / "out", **options).records
 
 
 def score(records: list[dict[str, Any]], label: str, target: str) -> float:

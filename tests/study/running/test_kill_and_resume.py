@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.study.executors import processes
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support import fake_study
 from tests.support.fake_study import held, solves, untimed, write_config
 from tests.support.patience import PATIENCE

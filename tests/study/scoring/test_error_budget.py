@@ -110,7 +110,7 @@ def test_what_is_unexplained_is_the_error_of_the_prediction_in_the_light_of_the_
 
 
 def test_the_predictions_of_the_shipped_config_learn_from_holograms_of_the_kind_that_is_split() -> None:
-    study = load_study(Path(__file__).parents[2] / "configs" / "error-budget.yaml")
+    study = load_study(Path(__file__).parents[3] / "configs" / "error-budget.yaml")
     assert study.holograms.name == "wirtinger"
     assert all(entry.params["start"] == dict(study.holograms.params) for entry in study.methods)
     assert all(entry.params["search"]["iterations"] == 0 for entry in study.methods)

@@ -15,7 +15,7 @@ from holobench_eval.study.executors import Serial
 from holobench_eval.study.running.progress import Lines, duration, watching
 from holobench_eval.study.running.run import run
 from holobench_eval.study.store import Record, Store
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.fake_study import write_config
 
 

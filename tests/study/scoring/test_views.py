@@ -22,7 +22,7 @@ methods:
   - {name: light_field, params: {frames: 4, iterations: 60}}
 protocol: {metrics: [psnr]}
 """
-FRAMES = (Path(__file__).parents[2] / "configs/profiles/ideal-frames.yaml").read_text()
+FRAMES = (Path(__file__).parents[3] / "configs/profiles/ideal-frames.yaml").read_text()
 TWO_SCENES = ("{places:", "{scenes: [shapes, shapes-2], places:")
 TWO_DISPLAYS = ("[ideal-frames.yaml]", "[ideal-frames.yaml, plm-4bit]")
 
