@@ -15,6 +15,7 @@ from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.plan import Plan, Task, plan
 from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.running.run import Outcome, run
+from tests.support.fake_study import install
 
 MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
 
@@ -82,6 +83,12 @@ def add_one_laser(folder: Path) -> None:
 
 TURNS = Serial(workers=2)
 """Says that it has two workers; what they compute takes turns."""
+
+
+def compute_faked(config: Path, output: Path) -> None:
+    """Run a study with the fakes, in a process that a test kills."""
+    install()
+    compute(config, output)
 
 
 def compute(

@@ -17,8 +17,7 @@ from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.study.studies import TURNS, compute, exchanged
-from tests.study.test_identity import write_profile
+from tests.study.studies import TURNS, compute, exchanged, write_ideal
 from tests.support import trained_study
 from tests.support.fake_study import solves, untimed, write_config
 
@@ -50,7 +49,7 @@ def write_study(folder: Path, displays: int = 1, *changes: tuple[str, str]) -> P
     """A study of double phase on displays of the same optics, with pieces of its config exchanged."""
     names = [f"display{number}" for number in range(displays)]
     for name in names:
-        write_profile(folder, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+        write_ideal(folder / f"{name}.yaml", ("name: ideal", f"name: {name}"))
     text = CONFIG.replace("PROFILES", ", ".join(f"{name}.yaml" for name in names))
     (folder / "study.yaml").write_text(exchanged(text, *changes))
     return folder / "study.yaml"
@@ -95,7 +94,7 @@ def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
 @pytest.mark.usefixtures("no_physics")
 def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        write_profile(tmp_path, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+        write_ideal(tmp_path / f"{name}.yaml", ("name: ideal", f"name: {name}"))
     config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
     assert compute(config, tmp_path / RESULTS / "a").solved == 2
     assert compute(config, tmp_path / RESULTS / "b").solved == 0

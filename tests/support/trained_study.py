@@ -59,6 +59,15 @@ def compute(config: Path, output: str = "out", write: Callable[[str], None] = pr
     return run(study, plan(study), folder / output, Serial(), Lines(write), 1, folder / "artifacts", **options)
 
 
+def computed(config: Path) -> list[dict[str, Any]]:
+    """The records of a study, all done, for several tests: its timings are beside it, not in the cache of one test."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(config.parent / "cache"))
+        records = compute(config).records
+    assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
+    return records
+
+
 def needs(config: Path) -> list[Preparation]:
     """What has to be learned for a study."""
     return list(plan(load_study(config)).preparations().values())

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from functools import partial
 from multiprocessing import forkserver
 from pathlib import Path
@@ -21,7 +20,7 @@ from holobench_eval.study.executors import Executor, Local, Serial, executor, pr
 from holobench_eval.study.running import run as running
 from tests.study import studies
 from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
-from tests.support.patience import PATIENCE
+from tests.support.patience import PATIENCE, wait_until
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
@@ -112,13 +111,6 @@ def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_an_err
 
 def run_of_two(folder: Path) -> None:
     list(Local(2).map(endless, [folder] * 2))
-
-
-def wait_until(reached: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not reached():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 @pytest.mark.slow

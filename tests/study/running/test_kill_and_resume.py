@@ -4,30 +4,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from holobench_eval.study.executors import processes
-from tests.study.studies import compute
+from tests.study.studies import compute, compute_faked
 from tests.support import fake_study
 from tests.support.fake_study import held, solves, untimed, write_config
-from tests.support.patience import PATIENCE
+from tests.support.patience import PATIENCE, killed_at, wait_until
 
 TARGETS = 5
-
-
-def compute_without_physics(config: Path, output: Path) -> None:
-    fake_study.install()
-    compute(config, output)
-
-
-def wait_for_solves(folder: Path, count: int) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while len(solves(folder)) < count:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 @pytest.mark.slow
@@ -36,11 +22,7 @@ def test_a_run_that_was_killed_and_interrupted_gives_the_records_of_one_that_was
     config, output = write_config(tmp_path, count=TARGETS), tmp_path / "out"
 
     with held(tmp_path, 1):
-        killed = processes.start(compute_without_physics, config, output)
-        wait_for_solves(tmp_path, 2)
-        killed.kill()
-        killed.join(PATIENCE)
-    assert killed.exitcode == -signal.SIGKILL
+        killed_at(lambda: len(solves(tmp_path)) >= 2, compute_faked, config, output)
 
     with held(tmp_path, 3):
         command = [sys.executable, fake_study.__file__, "run", str(config), "--output", str(output)]
@@ -50,7 +32,7 @@ def test_a_run_that_was_killed_and_interrupted_gives_the_records_of_one_that_was
             text=True,
             env=os.environ | {"MPLBACKEND": "agg"},
         )
-        wait_for_solves(tmp_path, 5)
+        wait_until(lambda: len(solves(tmp_path)) >= 5)
         stopped.send_signal(signal.SIGINT)
         _, err = stopped.communicate(timeout=PATIENCE)
     assert stopped.returncode == 130

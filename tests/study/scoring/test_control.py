@@ -14,7 +14,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.scoring import prediction
 from tests.support import veiled
-from tests.support.trained_study import compute, write
+from tests.support.trained_study import compute, computed, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 20}}")
 NAMED = ("methods:", "protocol: {metrics: [psnr, control]}\nmethods:")
@@ -44,10 +44,7 @@ def study(folder: Path, *changes: tuple[str, str]) -> Path:
 def scores(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], dict[str, float]]:
     """The scores of every model on both displays, of one target."""
     folder = tmp_path_factory.mktemp("control")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-        records = compute(study(folder, NAMED)).records
-    assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
+    records = computed(study(folder, NAMED))
     return {(record["label"], record["cell"]["condition"]): record["scores"] for record in records}
 
 

@@ -11,10 +11,10 @@ import torch
 from holobench_eval.core.errors import CellError
 from holobench_eval.metrics import score
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import REFERENCE, Task, plan
+from holobench_eval.study.plan import REFERENCE, plan
 from holobench_eval.study.scoring.scores import in_focus
 from tests.study.studies import assert_refused, exchanged, tasks_of
-from tests.support.trained_study import compute
+from tests.support.trained_study import compute, computed
 
 CONFIG = """\
 title: "Depth"
@@ -55,23 +55,18 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def solutions(folder: Path, *changes: tuple[str, str]) -> dict[str, list[Task]]:
-    """The tasks of every method."""
-    return tasks_of(write(folder, *changes))
-
-
 TWO_SCENES = ("{planes:", "{scenes: [shapes, shapes-2], planes:")
 TWO_DISPLAYS = ("[ideal]", "[leto-mild, leto-aged]")
 
 
 def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path: Path) -> None:
-    tasks = solutions(tmp_path, TWO_SCENES, TWO_DISPLAYS)
+    tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     assert [len(task.cells) for task in tasks["wirtinger"]] == [2] * 6
     assert [len(task.cells) for task in tasks["multi_plane"]] == [6] * 2
 
 
 def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None:
-    tasks = solutions(tmp_path)
+    tasks = tasks_of(write(tmp_path))
     lens = {task.cells[0].target: dict(task.cells[0].change) for task in tasks["wirtinger"]}
     assert lens == {"shapes@-1.5mm": {"refocus": -1.5}, "shapes@0mm": {}, "shapes@1.5mm": {"refocus": 1.5}}
     (stack,) = tasks["multi_plane"]
@@ -83,34 +78,27 @@ def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None
 def test_the_wrong_target_is_another_scene(tmp_path: Path) -> None:
     wrong = {
         cell.target: cell.params["target"]
-        for task in solutions(tmp_path, TWO_SCENES)["floor"]
+        for task in tasks_of(write(tmp_path, TWO_SCENES))["floor"]
         for cell in task.cells
         if cell.method == "floor_wrong_target"
     }
     assert wrong["shapes@-1.5mm"] == "shapes-2@-1.5mm"
     assert wrong["shapes-2@1.5mm"] == "shapes@1.5mm"
-    alone = {cell.method for task in solutions(tmp_path)["floor"] for cell in task.cells}
+    alone = {cell.method for task in tasks_of(write(tmp_path))["floor"] for cell in task.cells}
     assert "floor_wrong_target" not in alone
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("focus")
+Records = dict[tuple[str, str], dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def records(study: Path) -> dict[tuple[str, str], dict[str, Any]]:
+def records(tmp_path_factory: pytest.TempPathFactory) -> Records:
     """The records of a study on a real bench, by label and target."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(study / "cache"))
-        found = compute(write(study)).records
-    assert {record["state"] for record in found} == {"done"}, [record["reason"] for record in found]
+    found = computed(write(tmp_path_factory.mktemp("focus")))
     return {(record["label"], record["cell"]["target"]): record for record in found}
 
 
-def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(
-    records: dict[tuple[str, str], dict[str, Any]], tmp_path: Path
-) -> None:
+def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records: Records, tmp_path: Path) -> None:
     alone = CONFIG[CONFIG.index("  - {name: multi") : CONFIG.index("headline")]
     config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"), (alone, ""))
     pictures = {(r["label"], r["cell"]["target"]): r["scores"] for r in compute(config).records}
@@ -120,25 +108,21 @@ def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(
     assert set(found) - set(plain) == {"psnr_linear_infocus", "ssim_linear_infocus"}
 
 
-def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(
-    records: dict[tuple[str, str], dict[str, Any]],
-) -> None:
+def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(records: Records) -> None:
     for target in ("shapes@-1.5mm", "shapes@1.5mm"):
         joint, middle = (records[label, target]["scores"] for label in ("multi_plane", "Middle"))
         for name in ("psnr_linear", "psnr_linear_infocus"):
             assert joint[name] > middle[name] + 1
 
 
-def test_a_lens_keeps_more_than_the_camera_loses_without_one(
-    records: dict[tuple[str, str], dict[str, Any]],
-) -> None:
+def test_a_lens_keeps_more_than_the_camera_loses_without_one(records: Records) -> None:
     for target in ("shapes@-1.5mm", "shapes@1.5mm"):
         moved, stayed = (records[label, target]["scores"] for label in ("wirtinger", "Middle"))
         assert moved["psnr_linear"] > stayed["psnr_linear"] + 3
 
 
 def test_planes_of_a_scene_share_the_time_of_their_hologram_and_the_floor_is_scored_in_focus_too(
-    records: dict[tuple[str, str], dict[str, Any]],
+    records: Records,
 ) -> None:
     targets = ("shapes@-1.5mm", "shapes@0mm", "shapes@1.5mm")
     assert len({records["multi_plane", target]["seconds"] for target in targets}) == 1

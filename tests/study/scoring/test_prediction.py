@@ -1,7 +1,8 @@
 from __future__ import annotations
 
-import shutil
+from collections import OrderedDict
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,9 +10,9 @@ import pytest
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
+from holobench_eval.study.scoring import prediction as predicting
 from tests.study.studies import assert_refused
-from tests.support import fake_trained
-from tests.support.trained_study import CONFIG, compute, write
+from tests.support.trained_study import compute, computed, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 3}}")
 METHODS = ('["trained.py:Gain"]', '["trained.py:Gain", "trained.py:Even"]')
@@ -22,11 +23,7 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
     """The records of a prediction study on a real bench, by label."""
     folder = tmp_path_factory.mktemp("prediction")
     config = write(folder, PREDICTION, METHODS, ("count: 1", "count: 2"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-        found = compute(config).records
-    assert {record["state"] for record in found} == {"done"}, [record["reason"] for record in found]
-    return {record["label"]: record for record in found if record["cell"]["target"] == "picture 0"}
+    return {record["label"]: record for record in computed(config) if record["cell"]["target"] == "picture 0"}
 
 
 def test_the_ideal_image_predicts_the_capture_of_an_ideal_display(records: dict[str, dict[str, Any]]) -> None:
@@ -92,10 +89,8 @@ def test_what_cannot_be_predicted_is_refused_at_its_place(
 
 
 def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physics: None) -> None:
-    shutil.copy(fake_trained.__file__, tmp_path / "trained.py")
+    config = write(tmp_path, PREDICTION, ("trained.py:Gain", "narrow.py:Even"))
     plugins = (tmp_path / "trained.py").read_text()
-    config = tmp_path / "study.yaml"
-    config.write_text(CONFIG.replace(*PREDICTION).replace("trained.py:Gain", "narrow.py:Even"))
     (tmp_path / "narrow.py").write_text(plugins.replace("*bench.spec.region.shape)", "5, 5)"))
     reason = compute(config).records[-1]["reason"]
     assert reason == "Even: predict returned (1, 3, 5, 5), not an image (1, 3, 104, 104)"
@@ -111,3 +106,23 @@ def test_only_the_metrics_that_a_study_names_are_computed(tmp_path: Path, measur
     scores = {key for record in records for key in record["scores"]}
     assert {"psnr_linear", "psnr_srgb"} <= scores
     assert not any(name in key for key in scores for name in ("ssim", "mofd", "flip", "vsi"))
+
+
+def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved: list[Any] = []
+    bench = SimpleNamespace(photograph=lambda phase, *_, **__: None)
+    monkeypatch.setattr(predicting, "_photographs", OrderedDict())
+    monkeypatch.setattr(predicting.opening, "open_display", lambda *_: bench)
+
+    def solve(job: Any, cell: Any, display: Any) -> Any:
+        solved.append(cell.holograms["phase"]["code"])
+        return SimpleNamespace(phase=None, covered={})
+
+    monkeypatch.setattr(predicting, "_solved", solve)
+    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu", setting=SimpleNamespace(folder=Path()))
+    display: Any = "a display"
+    for version in ("before", "before", "after"):
+        probe = {"name": "mine.py:Mine", "params": {}, "code": version, "phase": {"code": version}}
+        cell: Any = SimpleNamespace(holograms=probe, repeat=0, seed=1, exposure="equal", target="tv_lines")
+        predicting.shown(job, cell, display)
+    assert solved == ["before", "after"]

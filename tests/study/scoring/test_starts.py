@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +18,6 @@ from holobench_eval.study import cost
 from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local
-from holobench_eval.study.executors.processes import start
 from holobench_eval.study.phases import phases_of, start_of
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.running import run as running
@@ -28,8 +25,8 @@ from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
 from tests.study.studies import add_other_profile
-from tests.support.fake_study import FAKES, fake_work, held, install, solves, untimed, write_config
-from tests.support.patience import PATIENCE
+from tests.support.fake_study import FAKES, fake_work, held, solves, untimed, write_config
+from tests.support.patience import killed_at
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
@@ -244,12 +241,6 @@ def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian() -> No
     assert float((torch.exp(1j * start) - torch.exp(1j * phase)).abs().max()) < 1e-4
 
 
-def compute_apart(config: Path) -> None:
-    """Compute with the fakes in a process that a test kills."""
-    install()
-    compute(config)
-
-
 @pytest.mark.slow
 def test_a_run_that_was_killed_before_and_at_the_followers_gives_the_records_of_one_that_was_not(
     computed: Path, grid: Plan, tmp_path: Path
@@ -257,15 +248,7 @@ def test_a_run_that_was_killed_before_and_at_the_followers_gives_the_records_of_
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), count=len(TARGETS))
     for index, begun in ((1, 3), (0, 6)):  # while a start is solved, and while the first follower is
         with held(tmp_path, index):
-            killed = start(compute_apart, config)
-            deadline = time.monotonic() + PATIENCE
-            while len(solves(tmp_path)) < begun:
-                assert killed.is_alive()
-                assert time.monotonic() < deadline
-                time.sleep(0.01)
-            killed.kill()
-            killed.join()
-        assert killed.exitcode == -signal.SIGKILL
+            killed_at(lambda: len(solves(tmp_path)) >= begun, studies.compute_faked, config, tmp_path / "out")  # noqa: B023
     whole = Store(computed / "out").load(grid)
     assert untimed(compute(config)) == untimed(whole)
 

@@ -8,7 +8,6 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Task
 from tests.study.studies import assert_refused, exchanged, tasks_of
 from tests.support.trained_study import compute
 
@@ -34,13 +33,8 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def solutions(folder: Path, *changes: tuple[str, str]) -> dict[str, list[Task]]:
-    """The tasks of every method."""
-    return tasks_of(write(folder, *changes))
-
-
 def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path: Path) -> None:
-    tasks = solutions(tmp_path, TWO_SCENES, TWO_DISPLAYS)
+    tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     for label in ("wirtinger", "light_field"):
         for task in tasks[label]:
             assert {cell.target.split(" ")[0] for cell in task.cells} == {task.cells[0].target.split(" ")[0]}
@@ -51,7 +45,7 @@ def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path
 
 
 def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path: Path) -> None:
-    tasks, dataset = solutions(tmp_path), load_study(tmp_path / "study.yaml").dataset
+    tasks, dataset = tasks_of(write(tmp_path)), load_study(tmp_path / "study.yaml").dataset
     views = sorted(dataset.views("shapes from 0.1"), key=lambda view: abs(dataset.place(view)))
     (one, every) = (tasks[label][0].cells[0].phase for label in ("wirtinger", "light_field"))
     assert one["target"]["sha256"] == dataset.digest(views[0])

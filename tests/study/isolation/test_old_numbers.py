@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holobench_eval.core.sources import code_of
-from holobench_eval.methods.double_phase import DoublePhase
-from holobench_eval.study import isolation
 from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.phases import RESULTS, Phases
-from holobench_eval.study.versions import method_version
 from tests.study.studies import TURNS
 from tests.study.studies import compute as compute_with
 from tests.support.trained_study import compute, needs, write
@@ -170,40 +165,6 @@ def test_a_file_that_a_parameter_names_is_the_one_of_the_working_directory_and_o
     assert psnr(found[0], "Named") == psnr(found[2], "Named") != psnr(found[1], "Named")
     assert psnr(found[0], "Mine") == psnr(found[1], "Mine")
     assert psnr(found[0], "oracle")
-
-
-def test_any_file_of_an_installed_package_is_part_of_its_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "a_package_of_methods"
-    reading(package, 1.0)
-    (package / "__init__.py").write_text("")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-
-    def version() -> str:
-        for name in [name for name in sys.modules if name.startswith(package.name)]:
-            del sys.modules[name]
-        return code_of(__import__(f"{package.name}.mine").mine.Mine).sha256
-
-    before = version()
-    assert version() == before
-    (package / "data.txt").write_text("6.0")
-    assert version() != before
-
-
-def test_a_method_that_calls_one_of_this_package_has_its_version(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "mine.py").write_text(
-        "from holobench_eval.methods.double_phase import DoublePhase\n\n\ndef Mine(target, bench):\n"
-        "    return DoublePhase().solve(target, bench)\n"
-    )
-
-    def version() -> str:
-        return method_version(type(isolation.solver("mine.py:Mine", {}, tmp_path, "none", None)))
-
-    before = version()
-    monkeypatch.setattr(DoublePhase, "version", 99, raising=False)
-    assert version() != before
 
 
 def test_a_phase_is_solved_by_one_at_a_time(tmp_path: Path) -> None:
