@@ -192,7 +192,7 @@ def score(
 
 
 def _in_domains(
-    image: Image, wanted: Image, metrics: Iterable[Metric], domains: tuple[Domain, ...] | None
+    image: Tensor, wanted: Tensor, metrics: Iterable[Metric], domains: tuple[Domain, ...] | None
 ) -> dict[str, float]:
     """The scores of a matched image by all metrics that its size allows, in some domains, by default the metric's."""
     scores: dict[str, float] = {}
@@ -206,7 +206,7 @@ def _in_domains(
 
 
 def _refined(
-    light: Image, factors: Tensor, wanted: Image, metrics: Iterable[Metric], domain: Domain
+    light: Tensor, factors: Tensor, wanted: Tensor, metrics: Iterable[Metric], domain: Domain
 ) -> dict[str, float]:
     """The scores after the bounded rigid refinement, and its move. factors: of the match, by channel."""
     moved = _refinement(wanted)(factors.view(-1, 1, 1) * light)
@@ -215,7 +215,7 @@ def _refined(
     return scores | {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
 
 
-def _softly(light: Image, wanted: Image, metrics: Iterable[Metric], domain: Domain, sigma: float) -> dict[str, float]:
+def _softly(light: Tensor, wanted: Tensor, metrics: Iterable[Metric], domain: Domain, sigma: float) -> dict[str, float]:
     """The scores of both, blurred alike by a Gaussian of this width [px]."""
     target = _softened(sigma)(wanted)
     soft, _ = match(_blurred(light, sigma), target)
