@@ -136,7 +136,7 @@ def preview(
     from ..study.identity import lacking
 
     methods = {entry.label: entry for entry in study.methods}
-    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks)
+    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks or {})
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]

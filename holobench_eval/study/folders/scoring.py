@@ -55,13 +55,8 @@ def described(folders: Folders, values: str, dark: str = "") -> dict[str, Any]:
     files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
     files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
     code = {"metrics": HARNESS, "alignment": ALIGNMENT}
-    return {
-        "code_sha256": code,
-        "files": files,
-        "values": values,
-        **({"dark": dark} if dark else {}),
-        **provenance.software(),
-    }
+    given = {"code_sha256": code, "files": files, "values": values} | ({"dark": dark} if dark else {})
+    return given | provenance.software()
 
 
 @dataclass(frozen=True)

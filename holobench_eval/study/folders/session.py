@@ -282,10 +282,9 @@ def _advance(study: Study, folder: Path, watch: Lines) -> Advance:
     photographer = session_photographer(folder)
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, 1, folder / ARTIFACTS, retry_failed=True)
     if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
-        raise UserError(
-            f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solved lacks those; "
-            "bring the whole folder of the session from where it was exported, or import it there"
-        )
+        fault = f"other holograms are computed here than were photographed, and {REPORT}/solved lacks those"
+        remedy = "bring the whole folder of the session from where it was exported, or import it there"
+        raise UserError(f"{folder}: {fault}; {remedy}")
     patterns = photographer.write_round() if photographer.wanted else []
     return Advance(study, tuple(patterns), outcome)
 
