@@ -68,9 +68,7 @@ def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_ta
     assert again > LARGE / 2
 
 
-def test_without_the_linux_files_time_is_measured_and_memory_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_linux_files_time_alone_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cost, "PROCESS", tmp_path / "nowhere")
     taken = cost.start().stop()
     assert taken.memory_mib is None
@@ -98,9 +96,7 @@ def every_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cost, "APART", 0.0)
 
 
-def test_the_last_measurement_is_the_one_that_estimates_use_and_many_write_few_files(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_estimates_use_the_last_measurement_and_many_write_few_files(monkeypatch: pytest.MonkeyPatch) -> None:
     for seconds in (2.5, 9.0):
         cost.keep("a", seconds)
         assert cost.recorded("a") == seconds
@@ -132,12 +128,8 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
     study = load_study(config)
     grid = plan(study)
     timed = [cell for cell in grid.cells if cell.id in cost.timed(study, grid)]
-    assert [(cell.method.rpartition(":")[2], cell.condition) for cell in timed] == [
-        ("Toy", "ideal"),
-        ("Toy", "other"),
-        ("Seeing", "ideal"),
-        ("Seeing", "other"),
-    ]
+    rows = [(method, display) for method in ("Toy", "Seeing") for display in ("ideal", "other")]
+    assert [(cell.method.rpartition(":")[2], cell.condition) for cell in timed] == rows
     assert {(cell.target, cell.repeat) for cell in timed} == {("gray 2", 0)}
     assert not cost.timed(replace(study, timing="shared"), grid)
 

@@ -90,9 +90,7 @@ def test_every_repeat_has_a_phase_of_its_own(tmp_path: Path) -> None:
     assert len({cell.phase_id for cell in repeats}) == len(repeats) == 2 * 3
 
 
-def test_another_version_of_a_method_or_another_of_the_same_code_makes_another_phase(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_or_method_makes_another_phase(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kinds = ("double_phase", "double_phase_aa", "double_phase_bl")
     assert len({first(grid(tmp_path, kind)).phase_id for kind in kinds}) == 3
     before = first(grid(tmp_path))
@@ -111,9 +109,7 @@ def test_other_nominal_optics_make_another_phase(tmp_path: Path, optics: tuple[s
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_another_display_of_the_same_optics_makes_another_capture_and_another_phase_where_it_is_seen(
-    tmp_path: Path, method: str
-) -> None:
+def test_another_display_of_the_same_optics_makes_another_phase_where_it_is_seen(tmp_path: Path, method: str) -> None:
     before = first(grid(tmp_path, method))
     for change in (("name: ideal", "name: another"), ("version: 1", "version: 2")):
         write_ideal(tmp_path / "mine.yaml", change)
@@ -149,9 +145,7 @@ def described(**changes: Any) -> Mapping[str, Any]:
     return identity.phase(**(given | {"draw": (1, "a", 0)} | changes))
 
 
-def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase_and_nothing_else_costs_one() -> (
-    None
-):
+def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase() -> None:
     plain = described()
     assert described(files={}, learned="", planes=[], display={}, captures=None, predicts=None) == plain
     assert described(files={"phases.npy": "1"}) != described(files={"phases.npy": "2"}) != plain
@@ -227,9 +221,7 @@ def artifact_id(folder: Path, *changes: tuple[str, str]) -> str:
     return needed.id
 
 
-def test_what_the_learned_state_depends_on_makes_another_artifact(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_state_depends_on_makes_another_artifact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     changes = [
         ("seed: 3", "seed: 4"),
         ("panel: [128, 128]", "panel: [128, 192]"),

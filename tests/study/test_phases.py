@@ -69,9 +69,7 @@ def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_p
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_study_beside_uses_the_phases_that_another_has_solved_and_solves_the_repeats_that_are_new(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: Path, found: list[str]) -> None:
     results = tmp_path / RESULTS
     first = compute(write_study(tmp_path), results / "a")
     second = compute(write_study(tmp_path, 3), results / "b", executor=Serial())
@@ -102,9 +100,7 @@ def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(t
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_phase_whose_file_is_lost_or_damaged_is_solved_again_to_the_same_scores(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path: Path, found: list[str]) -> None:
     config, output = write_study(tmp_path), tmp_path / "out"
     before = scores(compute(config, output))
     cells = [cell for cell in plan(load_study(config)).cells if cell.code]
@@ -157,9 +153,7 @@ def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_run_that_shared_the_machine(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path: Path, found: list[str]) -> None:
     results = tmp_path / RESULTS
     shared = compute(write_study(tmp_path), results / "a", executor=TURNS)
     config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))

@@ -46,7 +46,7 @@ def gain(**params: object) -> tuple[str, str]:
     return '"trained.py:Gain"', json.dumps({"name": "trained.py:Gain", "params": params})
 
 
-def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
+def test_a_spent_budget_fails_its_cells_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = write(tmp_path, BESIDE, gain(rounds=4), ("held_out: 1", "held_out: 1, captures: 3"))
@@ -62,10 +62,8 @@ def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
     assert reason.endswith("not trained: trained.py:Gain has used its 3 captures for training")
     assert "\n" not in reason
     table = pd.read_csv(tmp_path / "out" / "table.csv").query("category != 'floor'")
-    assert table[["label", "condition", "n", "failed"]].values.tolist() == [
-        ["Even", "ideal", 1, 0],
-        ["Gain", "ideal", 0, 1],
-    ]
+    rows = table[["label", "condition", "n", "failed"]].values.tolist()
+    assert rows == [["Even", "ideal", 1, 0], ["Gain", "ideal", 0, 1]]
 
 
 def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path: Path) -> None:
@@ -259,9 +257,7 @@ def provenance(folder: Path, form: str) -> dict[str, Any]:
 
 @pytest.mark.usefixtures("known")
 @pytest.mark.parametrize(("form", "missing"), [("[]", ["phase in steps of 2 pi / 256"]), ("['quantisation']", [])])
-def test_estimates_are_kept_beside_the_truth_and_what_the_form_has_not(
-    tmp_path: Path, form: str, missing: list[str]
-) -> None:
+def test_estimates_are_kept_beside_the_truth_and_what_is_missing(tmp_path: Path, form: str, missing: list[str]) -> None:
     kept = provenance(tmp_path, form)
     rows = kept["estimates"]
     assert [(row["name"], row["colour"]) for row in rows] == [("phase_gain", colour) for colour in range(3)]
@@ -322,9 +318,7 @@ def test_a_failed_cell_has_its_captures_and_a_retry_those_of_both_and_a_new_solu
     assert [record["captures"] for record in records()] == [2]
 
 
-def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_that_is_made_anew_its_own(
-    tmp_path: Path,
-) -> None:
+def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_made_anew_its_own(tmp_path: Path) -> None:
     config = write(tmp_path)
     plugins = tmp_path / "trained.py"
     dark = 'if number == 1 and Path(__file__).with_name("dark").exists():\n                raise ValueError("dark")\n'

@@ -68,7 +68,7 @@ def Method(target, bench):
 
 
 @pytest.mark.parametrize("text", [MINE, CALLING])
-def test_a_users_method_is_another_after_a_new_version_of_its_shipped_base_or_of_one_that_it_calls(
+def test_a_users_method_follows_the_version_of_its_base_and_of_what_it_calls(
     tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mine.py").write_text(text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -41,16 +40,6 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     path = folder / "study.yaml"
     path.write_text(text)
     return path
-
-
-def write_profile(folder: Path, *changes: tuple[str, str]) -> tuple[str, str]:
-    """The ideal profile in a file ``mine.yaml``, with pieces exchanged; the change of a config that names it."""
-    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
-    for old, new in (("name: ideal", "name: mine"), *changes):
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "mine.yaml").write_text(text)
-    return "[ideal]", "[mine.yaml]"
 
 
 def compute(config: Path, output: str = "out", write: Callable[[str], None] = print, **options: Any) -> Outcome:

@@ -104,25 +104,15 @@ def test_no_prediction_is_bought_with_figures_outside_their_tolerance(
     assert found["stray_light.share"] == max(best, start)
 
 
-def test_a_network_is_trained_on_the_candidate_and_scored_on_its_captures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_network_is_trained_and_scored_on_the_candidate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = {"training": {"rounds": 1, "steps": 1}, "retrieval": {"iterations": 0, "ms_ssim": 0.0}}
     study = {
         "title": "small",
         "measure": "prediction",
         "protocol": {"metrics": ["psnr"]},
         "holograms": {"name": "wirtinger", "params": {"iterations": 2}},
         "training": {"dataset": "dead_leaves", "params": {"count": 2, "seed": 2}, "held_out": 1},
-        "methods": [
-            {
-                "name": "hil",
-                "params": {
-                    "training": {"rounds": 1, "steps": 1},
-                    "retrieval": {"iterations": 0, "ms_ssim": 0.0},
-                    "network": {"name": "identity"},
-                },
-            }
-        ],
+        "methods": [{"name": "hil", "params": {**quick, "network": {"name": "identity"}}}],
     }
     one = Targets("photographs", {"count": 1})
     calibration = replace(SMALL, targets=one, prediction=Prediction(25.0, "stray_light.share", 0.3, study))
@@ -144,16 +134,14 @@ def test_a_calibration_belongs_to_the_profile_of_its_name_and_to_others_of_its_k
             load_calibration(other)
 
 
-def test_a_display_that_no_figures_were_published_for_is_refused_in_one_line_that_says_what_is_right(
-    tmp_path: Path,
-) -> None:
+def test_a_display_without_published_figures_is_refused_in_one_line_that_says_what_is_right(tmp_path: Path) -> None:
     (tmp_path / "wide.yaml").write_text("like: leto-hazy\nname: leto-hazy-wide\npanel: {pitch: 8.0e-6}\n")
     (tmp_path / "same.yaml").write_text(
         "name: leto-hazy\nversion: 1\nseed: 1\ndescription: ours\npanel: {shape: [128, 128], pitch: 6.4e-6, "
         "wavelengths: [5.2e-7], distance: 0.012, bits: 8}\n"
     )
     for file, said in (
-        ("wide", "panel.pitch is 8e-06, and the figures that calibrate fits are of 'leto-hazy', where it is 6.4e-06"),
+        ("wide", "panel.pitch is 8e-06, and"),
         ("same", "profile 'leto-hazy': panel.shape"),
     ):
         with pytest.raises(UserError) as refused:

@@ -98,7 +98,7 @@ def test_draws_are_resumed_and_a_line_that_was_cut_short_is_drawn_again(rows: tu
     np.testing.assert_equal(rows_of(folder / "draws.csv", list(found[0])), found)
 
 
-def test_what_is_kept_fits_under_its_own_name_and_its_file_is_the_display(
+def test_what_is_kept_fits_and_its_file_is_the_display(
     small: Family, rows: tuple[Path, list[Row]], tmp_path: Path
 ) -> None:
     folder, found = rows

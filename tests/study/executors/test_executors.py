@@ -33,7 +33,7 @@ def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_worker_processes_give_what_one_process_gives_but_for_the_cell_of_a_lost_worker(
+def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = write_config(tmp_path)
@@ -49,7 +49,7 @@ def test_worker_processes_give_what_one_process_gives_but_for_the_cell_of_a_lost
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_one_solution_of_every_row_is_timed_when_no_worker_does_anything_else(
+def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     methods = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}, pause: 0.2}}}}' for i in range(3))

@@ -85,9 +85,7 @@ def named(pictures: Path, file: str, amplitude: str = "") -> Path:
 
 
 @pytest.mark.parametrize("files", [("{stem}.npy",), ("{target}.npy", "{stem}.npy"), ("{stem}-{channel}.npy",)])
-def test_two_targets_with_the_same_file_are_refused_when_the_study_is_planned(
-    pictures: Path, files: tuple[str, ...]
-) -> None:
+def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures: Path, files: tuple[str, ...]) -> None:
     message = r"method 'phases': '\{stem\}.*\.npy' is the same file, a.*\.npy, for the targets 'a\.jpg' and 'a\.png'; "
     with pytest.raises(UserError, match=message) as refused:
         planned(named(pictures, *files))
@@ -96,9 +94,7 @@ def test_two_targets_with_the_same_file_are_refused_when_the_study_is_planned(
     assert len(ids(planned(named(pictures, "{stem}.npy")))) == 2
 
 
-def test_one_file_for_all_targets_is_no_mistake_and_where_it_is_not_there_the_target_with_an_altered_name_is_named(
-    pictures: Path,
-) -> None:
+def test_one_file_for_all_targets_is_no_mistake_and_a_target_with_an_altered_name_is_named(pictures: Path) -> None:
     assert len(set(ids(planned(named(pictures, "a.npy"))).values())) == 3
     for name in ("a.jpg", "a.png"):
         (pictures / name).unlink()

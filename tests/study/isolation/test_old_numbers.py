@@ -115,9 +115,7 @@ def test_the_same_code_at_two_places_reads_what_lies_beside_it(tmp_path: Path) -
     assert psnr(outcome, "a") != psnr(outcome, "b")
 
 
-def test_what_was_learned_is_learned_again_when_its_file_has_changed_and_scored_again_when_it_was_replaced(
-    tmp_path: Path,
-) -> None:
+def test_what_was_learned_is_learned_again_for_another_file_and_scored_again_when_replaced(tmp_path: Path) -> None:
     reading(tmp_path, 1.0)
     config = using(tmp_path, "'mine.py:Learning'")
     before = psnr(compute(config))

@@ -63,11 +63,8 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) ->
     study = load_study(config)
     grid, store = planning.plan(study), Store(tmp_path / "out")
     before = preview(study, grid, store, threads=1, workers=1)
-    assert [(row.label, row.cells, row.missing, row.seconds) for row in before] == [
-        ("floor", 18, 18, None),
-        ("Toy", 3, 3, None),
-        ("Seeing", 3, 3, None),
-    ]
+    rows = [(row.label, row.cells, row.missing, row.seconds) for row in before]
+    assert rows == [("floor", 18, 18, None), ("Toy", 3, 3, None), ("Seeing", 3, 3, None)]
     compute(config, tmp_path / "out")
     after = preview(study, grid, store, threads=1, workers=1)
     assert [(row.done, row.failed, row.missing) for row in after] == [(18, 0, 0), (2, 1, 0), (3, 0, 0)]
@@ -159,9 +156,7 @@ def test_a_time_is_said_in_the_unit_that_people_would_use(seconds: float, words:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_says_what_is_left_of_it_and_a_single_worker_tries_every_method_before_it_repeats_one(
-    tmp_path: Path,
-) -> None:
+def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
     study = load_study(write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing")))
     left, started = list[float | None](), list[str]()
 

@@ -145,7 +145,7 @@ Fresh = Callable[..., list[dict[str, Any]]]
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_a_new_metric_is_filled_from_kept_captures_to_the_last_digit_of_a_fresh_run(
+def test_a_new_metric_has_the_digits_of_a_fresh_run(
     study: Study, fresh: Fresh, done: Counter[str], measure: str
 ) -> None:
     config = study(measure)
@@ -192,9 +192,7 @@ def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(stu
 
 
 @pytest.mark.parametrize("measure", ["picture", "focus"])
-def test_without_captures_phases_are_shown_again_to_the_same_bits(
-    study: Study, fresh: Fresh, done: Counter[str], measure: str
-) -> None:
+def test_phases_are_shown_again_to_the_same_bits(study: Study, fresh: Fresh, done: Counter[str], measure: str) -> None:
     config = study(measure)
     store, every = Store(config.parent / "out"), cells(config)
     before = [store.capture(cell.id).read_bytes() for cell in every]
@@ -207,7 +205,7 @@ def test_without_captures_phases_are_shown_again_to_the_same_bits(
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_where_neither_is_kept_there_stays_a_hole_that_a_run_fills(
+def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(
     study: Study, fresh: Fresh, done: Counter[str], measure: str
 ) -> None:
     config = study(measure)
@@ -233,9 +231,7 @@ def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: S
 
 
 @pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file"])
-def test_a_damaged_capture_is_never_a_score_and_its_phase_is_photographed_again(
-    study: Study, done: Counter[str], damage: str
-) -> None:
+def test_the_phase_of_a_damaged_capture_is_photographed_again(study: Study, done: Counter[str], damage: str) -> None:
     config = study()
     file = Store(config.parent / "out").capture(cells(config)[0].id)
     content = file.read_bytes()

@@ -170,9 +170,7 @@ def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlie
     assert [record["alone"] for record in single] == [True] * 3
 
 
-def test_workers_that_may_come_while_a_study_runs_time_nothing_alone_unless_asked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_that_may_come_time_nothing_alone_unless_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Address, "workers", 1)
     monkeypatch.setattr(Address, "map", Serial.map)
     records = compute(write_config(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
@@ -201,9 +199,7 @@ class Needy(Toy):
 '''
 
 
-def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed_unless_nothing_is_left_for_it(
-    tmp_path: Path,
-) -> None:
+def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_left_for_it(tmp_path: Path) -> None:
     config, here = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
     (tmp_path / "plugins.py").write_text((tmp_path / "plugins.py").read_text() + NEEDY)
     with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
@@ -217,7 +213,7 @@ def test_a_method_that_cannot_run_here_is_refused_before_anything_is_computed_un
 
 
 @pytest.mark.parametrize("asked", ["protocol: {metrics: [psnr, lpips_alex]}", "headline: lpips_alex_srgb"])
-def test_a_metric_without_its_weights_is_refused_by_a_run_and_not_by_reading_the_study(
+def test_a_metric_without_its_weights_is_refused_by_a_run_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
 ) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))

@@ -78,9 +78,7 @@ def study_of(folder: Path, *methods: str) -> Path:
     return write_config(folder, tuple(f"{{name: camera.py:{method}}}" for method in methods), count=1)
 
 
-def test_a_method_over_its_budget_is_stopped_by_the_display_alone_and_its_best_hologram_so_far_is_scored(
-    tmp_path: Path,
-) -> None:
+def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path: Path) -> None:
     methods = [f"{name}, captures: 3" for name in ("Greedy", "Deaf", "Modest")]
     config = study_of(tmp_path, *methods, "Greedy, label: none, captures: 2, params: {keeps: false}", "Lying")
     found = compute(config, tmp_path / "out").records
@@ -89,10 +87,8 @@ def test_a_method_over_its_budget_is_stopped_by_the_display_alone_and_its_best_h
         assert (stopped["state"], stopped["captures"], stopped["scores"]) == ("done", 3, modest["scores"])
         assert stopped["stopped"] == f"{stopped['label']} has used its 3 captures"
     assert (modest["captures"], modest["stopped"]) == (3, "")
-    assert (none["state"], none["reason"]) == (
-        "failed",
-        "none has used its 2 captures and kept no phase; bench.keep(phase) keeps the best so far",
-    )
+    assert none["state"] == "failed"
+    assert none["reason"].startswith("none has used its 2 captures and kept no phase")
     assert (lying["state"], lying.get("stopped", "")) == ("failed", "")
 
 

@@ -42,9 +42,7 @@ def test_even_light_scores_what_the_floor_says_of_the_same_capture(records: dict
     assert records["Gain"]["scores"]["psnr_linear"] > floor["psnr_linear"] + 5
 
 
-def test_the_floor_compares_with_the_capture_and_not_with_the_target(
-    records: dict[str, dict[str, Any]], tmp_path: Path
-) -> None:
+def test_the_floor_compares_with_the_capture_not_the_target(records: dict[str, dict[str, Any]], tmp_path: Path) -> None:
     pictures = compute(write(tmp_path, ('["trained.py:Gain"]', '["trained.py:Even"]'))).records
     floor = {record["label"]: record["scores"] for record in pictures}
     for name in ("floor_black", "floor_shift_1px"):
@@ -66,24 +64,14 @@ def test_cells_of_predictions_name_the_hologram_and_are_no_cells_of_pictures(tmp
 
 
 REFUSED = [
-    (
-        "measure: prediction",
-        '["trained.py:Gain", wirtinger]',
-        "7:30: method 'wirtinger' predicts no captures; measure: prediction needs methods that do",
-    ),
-    (
-        'holograms: {name: "trained.py:Gain"}',
-        '["trained.py:Gain"]',
-        "3:19: method 'trained.py:Gain' has to be trained; holograms should be of one that learns nothing",
-    ),
+    ("measure: prediction", '["trained.py:Gain", wirtinger]', "7:30: method 'wirtinger' predicts no captures"),
+    ('holograms: {name: "trained.py:Gain"}', '["trained.py:Gain"]', "3:19: method 'trained.py:Gain' has to be trained"),
     ("holograms: {params: {iteration: 3}}", "[wirtinger]", "3:22: method 'wirtinger' has no parameter 'iteration'"),
 ]
 
 
 @pytest.mark.parametrize(("line", "methods", "message"), REFUSED)
-def test_what_cannot_be_predicted_is_refused_at_its_place(
-    tmp_path: Path, line: str, methods: str, message: str
-) -> None:
+def test_what_cannot_be_predicted_is_refused_in_place(tmp_path: Path, line: str, methods: str, message: str) -> None:
     config = write(tmp_path, ("seed: 3", f"seed: 3\n{line}"), ('["trained.py:Gain"]', methods))
     assert_refused(config, message)
 

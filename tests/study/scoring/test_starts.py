@@ -165,9 +165,7 @@ def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_
     assert not store.path(follower.id).exists()
 
 
-def test_starts_that_are_only_timed_again_leave_the_records_of_their_followers(
-    done: Path, store: Store, grid: Plan
-) -> None:
+def test_starts_that_are_only_timed_again_leave_their_followers_alone(done: Path, store: Store, grid: Plan) -> None:
     for cell in grid.cells:
         if (record := store.read(cell.id)) is not None and record.alone:
             store.write(replace(record, alone=False))
@@ -242,7 +240,7 @@ def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian() -> No
 
 
 @pytest.mark.slow
-def test_a_run_that_was_killed_before_and_at_the_followers_gives_the_records_of_one_that_was_not(
+def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(
     computed: Path, grid: Plan, tmp_path: Path
 ) -> None:
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), count=len(TARGETS))
@@ -253,9 +251,7 @@ def test_a_run_that_was_killed_before_and_at_the_followers_gives_the_records_of_
     assert untimed(compute(config)) == untimed(whole)
 
 
-def test_a_phase_that_began_with_another_phase_of_the_same_name_is_not_used(
-    done: Path, store: Store, grid: Plan
-) -> None:
+def test_a_phase_that_began_with_another_of_the_same_name_is_not_used(done: Path, store: Store, grid: Plan) -> None:
     phases, solved = phases_of(store.output), len(solves(done.parent))
     follower = cells(grid, "oracle")[0]
     for other in grid.cells:  # as another training leaves them
