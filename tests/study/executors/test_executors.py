@@ -175,27 +175,17 @@ def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_serve
         assert (other.exitcode, server._forkserver_pid) == (0, before)
 
 
-@pytest.mark.parametrize(
-    ("name", "workers", "small", "begins"),
-    [
-        ("local", None, False, True),
-        ("auto", None, True, True),
-        ("auto", 2, False, True),
-        ("auto", None, False, False),
-        ("auto", 1, True, False),
-        ("local", 1, True, False),
-        ("serial", None, True, False),
-        ("slurm", 4, True, False),
-    ],
-)
-def test_workers_are_prepared_only_where_they_are_needed(
-    name: str, workers: int | None, small: bool, begins: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+NEEDY = [("local", None, False), ("auto", None, True), ("auto", 2, False)]
+OTHERS = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial", None, True), ("slurm", 4, True)]
+
+
+@pytest.mark.parametrize("chosen", [*NEEDY, *OTHERS])
+def test_workers_are_prepared_only_where_they_are_needed(chosen: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[bool] = []
     monkeypatch.setattr(executors, "prepare", lambda: begun.append(True))
     monkeypatch.setattr(executors, "_cores", lambda: 2)
-    executors.begin(name, workers, small)
-    assert bool(begun) == begins
+    executors.begin(*chosen)
+    assert bool(begun) == (chosen in NEEDY)
 
 
 def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
