@@ -67,8 +67,8 @@ def output_folder(study: Study, output: Path | None) -> Path:
 
     A changed study has a folder of its own. UserError: the folder holds the report of the whole study.
     """
-    from ..study import provenance
     from ..study.changes import recorded
+    from ..study.running import provenance
 
     if not study.changes:
         return output or RESULTS / study.name
@@ -82,10 +82,10 @@ def output_folder(study: Study, output: Path | None) -> Path:
 
 def planned(config: Path, output: Path | None) -> tuple[Study, Path, Plan]:
     """A study as it was run into its folder, that folder, and the plan."""
-    from ..study import provenance
     from ..study.changes import recorded
     from ..study.config import load_study
     from ..study.plan import plan
+    from ..study.running import provenance
 
     study = load_study(config, recorded(provenance.read(output)) if output else None)
     return study, output_folder(study, output), plan(study)

@@ -134,7 +134,7 @@ def preview(
     from ..study.identity import lacking
 
     methods = {entry.label: entry for entry in study.methods}
-    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks)
+    states = store.states(plan.cells, cost.timed(study, plan), plan.metrics, study.folder, networks or {})
     rows = []
     for label in dict.fromkeys(task.label for task in plan.tasks):
         tasks = [task for task in plan.tasks if task.label == label]
@@ -181,7 +181,7 @@ def _photographs(entry: MethodEntry, folder: Path, targets: int, learning: Seque
 
 def table(study: Study, rows: list[Row]) -> Table:
     """The rows as a table with a line of sums, in 80 columns; without the time of solving where none is known."""
-    from ..study.progress import duration
+    from ..study.running.progress import duration
 
     result = Table(title=escape(study.title), title_justify="left", show_footer=True, **LOOK)
     floors = sum(row.cells for row in rows if row.label == FLOOR)
@@ -234,7 +234,7 @@ def trainings(plan: Plan, artifacts: Artifacts) -> list[TrainingRow]:
 
 def training_table(rows: list[TrainingRow]) -> Table:
     """What has to be learned, as a table in 80 columns; artifacts without the digest in their names."""
-    from ..study.progress import duration
+    from ..study.running.progress import duration
 
     result = Table(title="training", title_justify="left", **LOOK)
     for name in ("artifact", "needed by", "state"):

@@ -18,8 +18,8 @@ Metrics = Annotated[list[str] | None, typer.Option("--metric", metavar="NAME", h
 def rescore(config: Config, output: Output = None, metric: Metrics = None, threads: Threads = None) -> None:
     """Score kept captures by the metrics that their records lack. Nothing is solved, and no photograph is taken."""
     from ..study import executors
-    from ..study.progress import watching
-    from ..study.run import run as compute
+    from ..study.running.progress import watching
+    from ..study.running.run import run as compute
     from ..study.store import Store
 
     console = open_console()

@@ -1,8 +1,8 @@
 """``holoeval run``: from a config to its report.
 
-One image on its way to a table row: ``study.plan`` makes it a cell, ``study.run`` has the cell's method solve it, shows
-the phase on the cell's display, captures, registers and scores it, and writes one record; ``write_report`` makes the
-table from all records.
+One image on its way to a table row: ``study.plan`` makes it a cell, ``study.running.run`` has the cell's method solve
+it, shows the phase on the cell's display, captures, registers and scores it, and writes one record; ``write_report``
+makes the table from all records.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def run(
         from ..study.artifacts import Artifacts
         from ..study.config import load_study
         from ..study.plan import plan
-        from ..study.progress import watching
-        from ..study.run import run as compute
+        from ..study.running.progress import watching
+        from ..study.running.run import run as compute
         from ..study.training import keep_training_records
 
         console, study = open_console(), load_study(config, changes)
@@ -119,8 +119,8 @@ def _is_finished(config: Path, output: Path | None) -> bool:
 
 def replaced(study: Study, folder: Path) -> str:
     """What to say where a folder has the report of another config, or of another part of this one; else nothing."""
-    from ..study import provenance
     from ..study.changes import recorded
+    from ..study.running import provenance
 
     before = provenance.read(folder)
     if not (folder / "report.md").is_file() or before.get("config_sha256") == provenance.text_digest(study.text):

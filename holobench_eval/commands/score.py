@@ -87,11 +87,11 @@ def score_folders(
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
     from ..report.data.layout import Layout
-    from ..study import provenance
     from ..study.folders import FILES
     from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import CONDITION, Scoring, described
+    from ..study.running import provenance
     from ..study.store import Store
 
     if values not in VALUES:
@@ -159,7 +159,7 @@ def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
 @contextmanager
 def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
     """Show every step by its name: a bar on a terminal, else a line every few seconds."""
-    from ..study.progress import SECONDS_BETWEEN_LINES
+    from ..study.running.progress import SECONDS_BETWEEN_LINES
 
     if console.is_terminal:
         text = TextColumn("{task.description}", markup=False)

@@ -33,7 +33,7 @@ def export(
 ) -> None:
     """Write the patterns of a study: what to show, in which order, and under which names to save photographs."""
     from ..study.folders.session import export as begin
-    from ..study.progress import watching
+    from ..study.running.progress import watching
 
     with watching(console()) as watch:
         advance = begin(config, folder, watch, bench, display, fixed_exposure, dark)
@@ -47,7 +47,7 @@ def import_(
 ) -> None:
     """Check the photographs in a session's folder, score them, and write the next round where a method needs one."""
     from ..study.folders.session import go_on
-    from ..study.progress import watching
+    from ..study.running.progress import watching
 
     with watching(console()) as watch:
         advance = go_on(folder, watch, print, study)

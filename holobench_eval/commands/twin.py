@@ -124,8 +124,8 @@ def _show_on_twin(output: Path, artifacts: Path) -> None:
     from ..study.config import load_study
     from ..study.executors import Serial
     from ..study.plan import plan
-    from ..study.progress import watching
-    from ..study.run import run as compute
+    from ..study.running.progress import watching
+    from ..study.running.run import run as compute
 
     work = output / WORK
     study = load_study(work / f"{TRIAL}.yaml")

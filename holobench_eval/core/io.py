@@ -1,11 +1,14 @@
-"""Files: written whole or not at all, under names that any folder takes, dated alike."""
+"""Files: written whole or not at all, under names that any folder takes, dated alike, locked."""
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import re
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -68,6 +71,16 @@ def write_atomically(path: Path, content: bytes, lasting: bool = True) -> None:
     except OSError as error:
         reason = f"{path} cannot be written: {error.strerror}; mend that, and run the same command again"
         raise StorageError(reason) from error
+
+
+@contextmanager
+def locked(file: Path, waits: bool = True) -> Iterator[None]:
+    """Keep others out that lock the same file, whose folder is made. The lock dies with its process, so it never
+    outlives a kill. BlockingIOError where another has it and this one does not wait."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
 
 
 def sealed(content: bytes, name: str = "") -> bytes:

@@ -6,7 +6,7 @@ Any change to a value that ``score`` gives is a new version.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -174,32 +174,52 @@ def score(
     names, chosen = _chosen(metrics, lpips_weights)
     first: Domain = "stored" if stored else "linear"
     image, factors = match(light, wanted)
-    scores: dict[str, float] = {}
-    computed = [metric for metric in chosen if min(image.shape[1:]) >= metric.smallest]
-    for domain in _ENCODINGS:  # one after the other: in all of them a large image would fill the memory
-        here = [metric for metric in computed if domain in (("stored",) if stored else metric.domains)]
-        if here:
-            encoded, reference = _ENCODINGS[domain](image), _encoded_target[domain](wanted)
-            scores |= {f"{metric.name}_{domain}": float(metric.function(encoded, reference)) for metric in here}
-            del encoded, reference
+    scores = _in_domains(image, wanted, chosen, ("stored",) if stored else None)
     del image
-    repeated = [metric for metric in chosen if metric.name in _REPEATED]
-    if refine and repeated:
-        moved = _refinement(wanted)(factors.view(-1, 1, 1) * light)
-        again, _ = match(moved.image.to(wanted), wanted)
-        scores |= {f"{metric.name}_{first}_refined": float(metric.function(again, wanted)) for metric in repeated}
-        scores |= {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
-        del moved, again  # of a large image, before the blurred ones are made
-    for sigma in blur if repeated else ():
-        soft_target = _softened(sigma)(wanted)
-        soft, _ = match(_blurred(light, sigma), soft_target)
-        scores |= {f"{m.name}_{first}_blur{sigma:g}": float(m.function(soft, soft_target)) for m in repeated}
-        del soft, soft_target
+    if repeated := [metric for metric in chosen if metric.name in _REPEATED]:
+        if refine:
+            scores |= _refined(light, factors, wanted, repeated, first)
+        for sigma in blur:
+            scores |= _softly(light, wanted, repeated, first, sigma)
     if "speckle_contrast" in names and not stored:
         contrast = speckle_contrast(light, wanted)
         scores |= {} if math.isnan(contrast) else {"speckle_contrast": contrast}
     scores["brightness_ratio"] = float(light.mean() / wanted.mean())
     return scores | {f"scale_{channel}": float(factor) for channel, factor in enumerate(factors)}
+
+
+# Each of the next three lets go of the images that it makes: those of a large picture would fill the memory together.
+
+
+def _in_domains(
+    image: Tensor, wanted: Tensor, metrics: Iterable[Metric], domains: tuple[Domain, ...] | None
+) -> dict[str, float]:
+    """The scores of a matched image by all metrics that its size allows, in some domains, by default the metric's."""
+    scores: dict[str, float] = {}
+    computed = [metric for metric in metrics if min(image.shape[1:]) >= metric.smallest]
+    for domain in _ENCODINGS:
+        if here := [metric for metric in computed if domain in (domains or metric.domains)]:
+            encoded, reference = _ENCODINGS[domain](image), _encoded_target[domain](wanted)
+            scores |= {f"{metric.name}_{domain}": float(metric.function(encoded, reference)) for metric in here}
+            del encoded, reference
+    return scores
+
+
+def _refined(
+    light: Tensor, factors: Tensor, wanted: Tensor, metrics: Iterable[Metric], domain: Domain
+) -> dict[str, float]:
+    """The scores after the bounded rigid refinement, and its move. factors: of the match, by channel."""
+    moved = _refinement(wanted)(factors.view(-1, 1, 1) * light)
+    again, _ = match(moved.image.to(wanted), wanted)
+    scores = {f"{metric.name}_{domain}_refined": float(metric.function(again, wanted)) for metric in metrics}
+    return scores | {"refine_dx_px": moved.dx, "refine_dy_px": moved.dy, "refine_theta_deg": moved.theta}
+
+
+def _softly(light: Tensor, wanted: Tensor, metrics: Iterable[Metric], domain: Domain, sigma: float) -> dict[str, float]:
+    """The scores of both, blurred alike by a Gaussian of this width [px]."""
+    target = _softened(sigma)(wanted)
+    soft, _ = match(_blurred(light, sigma), target)
+    return {f"{m.name}_{domain}_blur{sigma:g}": float(m.function(soft, target)) for m in metrics}
 
 
 @lru_cache(maxsize=8)

@@ -40,8 +40,8 @@ def build_report(
     """Write everything a reader of the study gets into ``output``; return the path of report.md and its numbers.
 
     records: one for every planned cell, as ``Store.load`` gives them; thumbnails are taken from ``output/records``.
-    provenance: see ``study.provenance``; keep_pictures: keep the figures made of pictures that are there, with their
-    captions, and draw the others alone. UserError when no record has the headline metric.
+    provenance: see ``study.running.provenance``; keep_pictures: keep the figures made of pictures that are there, with
+    their captions, and draw the others alone. UserError when no record has the headline metric.
     """
     return write_report(layout_of(study), records, output, provenance, describe(study), keep_pictures)
 

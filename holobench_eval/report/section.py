@@ -27,8 +27,8 @@ class Report:
     """What sections are made from.
 
     records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
-    see ``study.provenance``; kept: captions of the figures made of pictures that an earlier report left, by file, where
-    the thumbnails are not there to draw them from (None: they are).
+    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by
+    file, where the thumbnails are not there to draw them from (None: they are).
     """
 
     results: Results

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import fcntl
 import hashlib
 import io
 import json
@@ -24,7 +23,7 @@ import torch
 from ..core.errors import UserError, reason
 from ..core.files import open_regular
 from ..core.hashing import State, digest, file_digest, file_state
-from ..core.io import TEMPORARY, file_name, write_atomically
+from ..core.io import TEMPORARY, file_name, locked, write_atomically
 from ..display.account import Journal
 from .displays import Preparation
 from .isolation import changed
@@ -35,6 +34,8 @@ UNFINISHED = "unfinished"
 # had to learn. Both are small enough to be committed; a report does not need the tensors.
 RECORDS = "training"
 FORMAT = 1
+REQUIRED = {"description": dict, "sha256": str, "log_sha256": str, "captures": int, "seconds": int | float}
+AGAIN = "delete the folder and run again"
 MOST_BYTES = 16_000_000_000  # of a file of tensors
 ROUND = ("round", "captures", "seconds", "predicted_psnr", "captured_psnr", "fidelity_psnr")  # columns of a log
 OTHER = {  # by the entry of a description
@@ -102,7 +103,7 @@ class Artifacts:
         except OSError:
             described = None
         if described is None:
-            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; delete the folder and run again")
+            raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; {AGAIN}")
         artifact = _loaded(folder, states, described)
         check_matches(folder, artifact.provenance, preparation)
         return artifact
@@ -157,11 +158,9 @@ class Artifacts:
 
     @contextmanager
     def locked(self, preparation: Preparation) -> Iterator[None]:
-        """Let other processes that want to make the same artifact wait. The lock dies with its process."""
+        """Let other processes that want to make the same artifact wait."""
         folder = self.folder_of(preparation)
-        folder.mkdir(parents=True, exist_ok=True)
-        with (folder / ".lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with locked(folder / ".lock"):
             for left in folder.rglob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
@@ -172,7 +171,7 @@ class Artifacts:
 
     def journal(self, preparation: Preparation) -> Journal:
         """The captures of an unfinished training, those of attempts that failed included."""
-        return _journal(self.folder_of(preparation))
+        return self.memory(preparation).journal
 
 
 @dataclass(frozen=True)
@@ -195,7 +194,7 @@ class FolderMemory:
     def log(self, row: Mapping[str, float | int | str]) -> None:
         """Add a row to ``training.csv``, ordered by round and step; rows of the same round and step are merged."""
         new = {key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in row.items()}
-        position, rows = _round_and_step(row), self.rows()
+        position, rows = _round_and_step(row), read_log(self.folder)
         earlier = next((old for old in rows if position and _round_and_step(old) == position), None)
         if earlier is None:
             rows.append(new)
@@ -209,16 +208,13 @@ class FolderMemory:
         writer.writerows([{key: value or "" for key, value in entry.items()} for entry in rows])
         write_atomically(self.folder / LOG, text.getvalue().encode())
 
-    def rows(self) -> list[dict[str, str]]:
-        """The log so far."""
-        return read_log(self.folder)
+    @property
+    def journal(self) -> Journal:
+        """The captures that the training took."""
+        return Journal(self.folder / UNFINISHED / "captures")
 
     def _path(self, name: str) -> Path:
         return self.folder / UNFINISHED / f"{file_name(name)}.pt"
-
-
-def _journal(folder: Path) -> Journal:
-    return Journal(folder / UNFINISHED / "captures")
 
 
 def _round_and_step(row: Mapping[str, Any]) -> dict[str, str]:
@@ -253,9 +249,8 @@ def read_tensors(path: Path, file: IO[bytes] | None = None) -> dict[str, Any]:
         raise
     except Exception as error:  # damaged bytes raise whatever they happen to mean
         reason = str(error).partition("\n")[0][:120]
-        raise UserError(
-            f"{path}: damaged, or not a file of tensors ({reason}); delete its folder and run again"
-        ) from None
+        fault = f"damaged, or not a file of tensors ({reason})"
+        raise UserError(f"{path}: {fault}; delete its folder and run again") from None
     if not isinstance(content, dict):
         raise UserError(f"{path}: holds no mapping; delete its folder and run again")
     return content
@@ -267,11 +262,9 @@ def _loaded(folder: Path, _states: tuple[State | None, ...], described: bytes) -
     content = read_tensors(folder / STATE)
     for name, key in ((STATE, "sha256"), (LOG, "log_sha256")):
         if file_digest(folder / name) != provenance[key]:
-            raise UserError(
-                f"{folder / name}: is not the file that {PROVENANCE} describes; delete the folder and run again"
-            )
+            raise UserError(f"{folder / name}: is not the file that {PROVENANCE} describes; {AGAIN}")
     if content.get("format") != FORMAT or not isinstance(content.get("state"), dict):
-        raise UserError(f"{folder / STATE}: of another version; delete the folder and run again")
+        raise UserError(f"{folder / STATE}: of another version; {AGAIN}")
     return Artifact(content["state"], provenance)
 
 
@@ -282,13 +275,12 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError):
         content = None
     if not isinstance(content, dict):
-        raise UserError(f"{path}: not an artifact's provenance; delete the folder and run again")
+        raise UserError(f"{path}: not an artifact's provenance; {AGAIN}")
     if content.get("format") != FORMAT:
-        raise UserError(f"{path}: of another version; delete the folder and run again")
-    digests = {"sha256": str, "log_sha256": str}
-    for key, kind in {"description": dict, **digests, "captures": int, "seconds": int | float}.items():
+        raise UserError(f"{path}: of another version; {AGAIN}")
+    for key, kind in REQUIRED.items():
         if not isinstance(content.get(key), kind):
-            raise UserError(f"{path}: has no valid '{key}'; delete the folder and run again")
+            raise UserError(f"{path}: has no valid '{key}'; {AGAIN}")
     return content
 
 
@@ -298,10 +290,8 @@ def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Prep
     for key in wanted:
         if trained.get(key) != wanted[key]:
             own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
-            name = key.replace("_", " ")
-            raise UserError(
-                f"{folder}: trained for {name} {other}, this study needs {own}; delete it, or give --retrain"
-            )
+            found = f"trained for {key.replace('_', ' ')} {other}, this study needs {own}"
+            raise UserError(f"{folder}: {found}; delete it, or give --retrain")
 
 
 @dataclass(frozen=True)
@@ -335,8 +325,12 @@ class TrainingRecord:
 
 def provenance_of(folder: Path) -> dict[str, Any] | None:
     """An artifact's provenance, read without its tensors; None where it is missing or unreadable."""
+    return _described(folder / PROVENANCE)
+
+
+def _described(path: Path) -> dict[str, Any] | None:
     try:
-        content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return content if isinstance(content, dict) and isinstance(content.get("description"), dict) else None
@@ -344,15 +338,12 @@ def provenance_of(folder: Path) -> dict[str, Any] | None:
 
 def training_records(output: Path) -> dict[str, TrainingRecord]:
     """The trainings beside a report, by ``Preparation.id``; files that are no provenance are skipped."""
-    records = []
+    records = {}
     for path in sorted((output / RECORDS).glob("*.json")):
-        try:
-            provenance = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError:
-            continue
-        if isinstance(provenance, dict) and isinstance(provenance.get("description"), dict):
-            records.append(TrainingRecord(provenance, rounds_of(path.with_suffix(".csv"))))
-    return {record.id: record for record in records}
+        if (provenance := _described(path)) is not None:
+            record = TrainingRecord(provenance, rounds_of(path.with_suffix(".csv")))
+            records[record.id] = record
+    return records
 
 
 def rounds_of(log: Path) -> tuple[Round, ...]:
@@ -371,4 +362,4 @@ def progress(folder: Path) -> tuple[float, float]:
     """Captures of an unfinished training, and its seconds up to the last round in its log; NaN where unknown."""
     rows = rounds_of(folder / LOG)
     captures, seconds = (rows[-1].captures, rows[-1].seconds) if rows else (math.nan, math.nan)
-    return _journal(folder).captures or captures, seconds
+    return FolderMemory(folder).journal.captures or captures, seconds

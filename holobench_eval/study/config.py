@@ -156,9 +156,8 @@ def _display(study: Study, document: Document) -> DisplayGrid:
     if display.bench and display.panel is not None:
         raise document.error(("display", "panel"), "a bench has the panel that its file says; remove 'panel'")
     if display.bench and study.measure in STACKS:
-        needed = f"a camera that {STACKS[study.measure]}"
-        message = f"measure: {study.measure} needs {needed}; measure pictures or predictions"
-        raise document.error(("measure",), message)
+        message = f"needs a camera that {STACKS[study.measure]}; measure pictures or predictions"
+        raise document.error(("measure",), f"measure: {study.measure} {message}")
     if learned is None:
         return display
     if study.measure != "picture":
@@ -198,11 +197,11 @@ def _specs(study: Study, document: Document) -> dict[str, DisplaySpec]:
                 raise UserError(f"{both}; list each display once")
             if learned:
                 refuse_plane(isolation.traits(learned.method, study.folder), learned.method, display.spec)
+        needs = f"measure: {study.measure}"
         if study.measure in STACKS and display.network:
-            raise document.error(("measure",), f"measure: {study.measure} moves planes; '{profile}' is a network")
+            raise document.error(("measure",), f"{needs} moves planes; '{profile}' is a network")
         if study.measure in STACKS and display.spec.plane == "fourier":
-            message = f"measure: {study.measure} needs a Fresnel plane; '{profile}' has a Fourier plane"
-            raise document.error(("measure",), message)
+            raise document.error(("measure",), f"{needs} needs a Fresnel plane; '{profile}' has a Fourier plane")
         name, region = display.name, display.spec.region.shape
         if min(region) < SMALLEST_REGION:
             message = f"'{name}' scores a window of {region[0]} x {region[1]} pixels of this panel"
@@ -238,8 +237,8 @@ def _entry(study: Study, document: Document, entry: MethodEntry, specs: Mapping[
         if study.display.real and traits.privileged:
             raise UserError(f"'{entry.name}' looks into a simulated bench; remove it from a study on a real one")
     if entry.captures is not None and (not traits.camera or study.predicts):
-        message = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
-        raise document.error((*where, "captures"), message)
+        fault = f"'{entry.name}' takes no captures of a target here; remove 'captures'"
+        raise document.error((*where, "captures"), fault)
     profiles = _subset(study, document, entry.profiles, (*where, "profiles"))
     with placed(document, (*where, "name"), (*where, "name")):
         for source in profiles:

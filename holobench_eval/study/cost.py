@@ -232,13 +232,8 @@ def timed(study: Study, plan: Plan) -> frozenset[str]:
     """
     if study.timing == "shared":
         return frozenset()
-    last = {
-        (task.label, cell.condition): task
-        for task in plan.tasks
-        if not task.is_floor
-        for cell in task.cells
-        if cell.repeat == 0
-    }
+    solved = [task for task in plan.tasks if not task.is_floor]
+    last = {(task.label, cell.condition): task for task in solved for cell in task.cells if cell.repeat == 0}
     return frozenset(cell.id for task in last.values() for cell in task.cells)
 
 

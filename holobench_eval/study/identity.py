@@ -35,12 +35,8 @@ from .versions import GIVEN, GIVEN_GRAY, HARNESS, PHOTOGRAPHS
 
 Plain = dict[str, Any]
 BASIS = ("given", "target", "optics", "draw")  # entries of a phase that are not of its method
-LATER = {
-    "levels": (),
-    "frames": 1,
-    "spectrum": (),
-    "plane": "fresnel",
-}  # nominal optics that came later: a display without them keeps its names
+# Nominal optics that came later: a display without them keeps its names.
+LATER = {"levels": (), "frames": 1, "spectrum": (), "plane": "fresnel"}
 SPECKLE = "speckle_contrast"
 # What the protocol gives beside its metrics: the match of a capture with its target, and the move that refines both.
 MATCH, REFINED = "match", "refine"
@@ -72,7 +68,7 @@ def phase(
     **further
         What only some methods depend on, such as what they learned; what is empty or None is left out.
     """
-    return _plain({**basis(target, spec, draw), "code": code, "params": dict(params), **_filled(further)})
+    return as_json({**basis(target, spec, draw), "code": code, "params": dict(params), **_filled(further)})
 
 
 def basis(target: Mapping[str, Any], spec: DisplaySpec, draw: tuple[object, ...]) -> Plain:
@@ -80,23 +76,18 @@ def basis(target: Mapping[str, Any], spec: DisplaySpec, draw: tuple[object, ...]
     told = asdict(spec)
     optics = {name: told[name] for name in told if name != "name" and (name not in LATER or told[name] != LATER[name])}
     given = GIVEN if len(spec.wavelengths) > 1 else GIVEN_GRAY
-    return _plain({"given": given, "target": dict(target), "optics": optics, "draw": list(draw)})
+    return as_json({"given": given, "target": dict(target), "optics": optics, "draw": list(draw)})
 
 
 def display(shown_on: Condition) -> Plain:
     """The description of a display: a profile or a bench file at a version, its panel, and what has changed on it."""
     plain = {"name": shown_on.name, "version": shown_on.version, "sha256": shown_on.digest}
-    return {
-        **plain,
-        "panel": list(shown_on.spec.shape),
-        **_filled(
-            {
-                "change": list(shown_on.change or ()),
-                "learned": shown_on.learned.id if shown_on.learned else "",
-                "session": shown_on.real.session if shown_on.real else "",
-            }
-        ),
+    further = {
+        "change": list(shown_on.change or ()),
+        "learned": shown_on.learned.id if shown_on.learned else "",
+        "session": shown_on.real.session if shown_on.real else "",
     }
+    return {**plain, "panel": list(shown_on.spec.shape), **_filled(further)}
 
 
 def seen(by: Condition) -> Plain:
@@ -118,13 +109,13 @@ def capture(of: Mapping[str, Any], shown_on: Condition | None, **further: Any) -
     """
     real = shown_on is not None and shown_on.real is not None
     plain = {"phase": dict(of), "harness": f"{HARNESS}; {PHOTOGRAPHS}" if real else HARNESS}
-    return _plain(plain | _filled({"display": shown_on and display(shown_on), **further}))
+    return as_json(plain | _filled({"display": shown_on and display(shown_on), **further}))
 
 
-def _plain(description: Plain) -> Plain:
+def as_json(description: Plain) -> Plain:
     """The same as it is read from a file, with lists in the place of tuples."""
-    plain: Plain = json.loads(canonical(description))
-    return plain
+    read: Plain = json.loads(canonical(description))
+    return read
 
 
 def _filled(entries: Mapping[str, Any]) -> Plain:

@@ -31,28 +31,9 @@ def open_display(display: Condition, seed: int, device: torch.device = CPU) -> B
 
     CellError when its calibration cannot be trusted; a failed calibration is kept and not repeated for every cell.
     """
-    return _cached(display, seed, device)
-
-
-def simulated(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
-    """``open_display`` of a simulated display."""
-    bench = _cached(display, seed, device)
-    assert isinstance(bench, CalibratedBench)
-    return bench
-
-
-def _cached(display: Condition, seed: int, device: torch.device) -> Bench:
+    place = display.source, display.folder, display.digest, display.spec.shape
     where = None if display.real else device  # a real one is opened once, whoever computes
-    key = (
-        display.source,
-        display.folder,
-        display.digest,
-        display.spec.shape,
-        display.change,
-        display.real,
-        seed,
-        where,
-    )
+    key = *place, display.change, display.real, seed, where
     if key not in _open:
         _open[key] = _opened(display, seed, device)
         pixels = display.spec.shape[0] * display.spec.shape[1]
@@ -66,6 +47,13 @@ def _cached(display: Condition, seed: int, device: torch.device) -> Bench:
 
 
 _open: OrderedDict[object, Bench | CellError] = OrderedDict()  # least recently used first
+
+
+def simulated(display: Condition, seed: int, device: torch.device = CPU) -> CalibratedBench:
+    """``open_display`` of a simulated display."""
+    bench = open_display(display, seed, device)
+    assert isinstance(bench, CalibratedBench)
+    return bench
 
 
 def forget_sessions() -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import io
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from torch import Tensor
 
 from ..core import plugins
 from ..core.hashing import digest
-from ..core.io import sealed, unsealed, write_atomically
+from ..core.io import locked, sealed, unsealed, write_atomically
 from ..display.account import Journal
 from ..display.metered import Solver
 from ..display.traits import traits_of
@@ -80,14 +79,10 @@ class Phases:
             return None
         return Solution(**content | {"cost": Cost(**content["cost"])}, reused=True)
 
-    @contextmanager
-    def locked(self, identity: str) -> Iterator[None]:
+    def locked(self, identity: str) -> AbstractContextManager[None]:
         """Let others that want a phase wait, here and in other studies, so that its captures are taken and counted
         once."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / f"{identity}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
+        return locked(self.folder / f"{identity}.lock")
 
     def journal(self, identity: str) -> Journal:
         """The captures that a phase takes, in all attempts, until it is kept."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import UserError
-from ..core.hashing import canonical, digest
+from ..core.hashing import digest
 from ..display.api import Exposure
 from ..display.traits import traits_of
 from . import identity, isolation
@@ -106,9 +105,7 @@ class Cell:
     def facts(self) -> dict[str, Any]:
         """What reports say of the cell, as plain values."""
         names = [item.name for item in fields(self) if item.name not in ("phase", "shown_on", "holograms", "files")]
-        facts = {name: getattr(self, name) for name in names} | {"change": self.change}
-        plain: dict[str, Any] = json.loads(canonical(facts))
-        return plain
+        return identity.as_json({name: getattr(self, name) for name in names} | {"change": self.change})
 
 
 @dataclass(frozen=True)
@@ -333,12 +330,10 @@ class _Ground:
 
     def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
         """The targets and displays of each solution."""
-        measure = self.study.measure
-        for group in (
-            [(display,) for display in entry_displays] if self.study.predicts else _sharing(cls, entry_displays)
-        ):
+        apart = [[display] for display in entry_displays]
+        for group in apart if self.study.predicts else _sharing(cls, entry_displays):
             if self.stacks:
-                yield from showings(cls, group, targets, self.stacks, measure)
+                yield from showings(cls, group, targets, self.stacks, self.study.measure)
             else:
                 yield from ([(target, display) for display in group] for target in targets)
 
@@ -394,7 +389,7 @@ def _ids(*trainings: Preparation | None) -> tuple[str, ...]:
     return tuple(training.id for training in trainings if training is not None)
 
 
-def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Condition, ...]]:
+def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[list[Condition]]:
     """Displays grouped so that the displays of a group share a solution.
 
     A method that neither captures nor trains nor is privileged knows only the nominal optics, so displays with equal
@@ -403,13 +398,11 @@ def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[tuple[Cond
     """
     traits = traits_of(cls)
     if traits.camera or traits.privileged:
-        return [(display,) for display in entry_displays]
-    groups = dict[Any, list[Condition]]()
+        return [[display] for display in entry_displays]
+    groups = defaultdict[Any, list[Condition]](list)
     for display in entry_displays:
-        groups.setdefault((display.name, display.spec) if traits.trains else replace(display.spec, name=""), []).append(
-            display
-        )
-    return [tuple(group) for group in groups.values()]
+        groups[(display.name, display.spec) if traits.trains else replace(display.spec, name="")].append(display)
+    return list(groups.values())
 
 
 def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields
 from functools import cache, cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Interval
@@ -19,7 +19,7 @@ from typing_extensions import TypedDict  # pydantic takes that of Python from 3.
 from ..core.errors import UserError
 from ..core.files import read_regular
 from ..core.hashing import canonical, digest
-from ..core.io import TEMPORARY, file_name, write_atomically
+from ..core.io import TEMPORARY, file_name, locked, write_atomically
 from . import identity, isolation
 from .plan import Cell, Plan
 
@@ -184,9 +184,9 @@ class Store:
         self,
         cells: tuple[Cell, ...],
         timed: frozenset[str] = frozenset(),
-        metrics: Mapping[str, str] | None = None,
+        metrics: Mapping[str, str] = MappingProxyType({}),
         folder: Path = Path(),
-        networks: Mapping[str, str] | None = None,
+        networks: Mapping[str, str] = MappingProxyType({}),
     ) -> dict[str, State]:
         """State of every cell's record, by the cell's id. Missing is also one whose method read a changed file, or has
         learned something else since.
@@ -198,31 +198,25 @@ class Store:
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in recorded else None
-            if (
-                record is None
-                or isolation.changed(record.reads, folder)
-                or _has_unlearned(cell, record, networks or {})
-            ):
+            if record is None or isolation.changed(record.reads, folder) or _has_unlearned(cell, record, networks):
                 return "missing"
             if record.state != "done":
                 return record.state
             if cell.id in timed and not record.alone:
                 return "untimed"
-            return "unscored" if identity.lacking(record.scores, metrics or {}) else "done"
+            return "unscored" if identity.lacking(record.scores, metrics) else "done"
 
         return {cell.id: state(cell) for cell in cells}
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs out of the folder. The lock dies with its process, so it never outlives a kill."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / ".lock").open("w") as lock:
+        """Keep other runs out of the folder."""
+        with ExitStack() as held:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                held.enter_context(locked(self.folder / ".lock", waits=False))
             except BlockingIOError:
-                raise UserError(
-                    f"{self.output}: another run is using this folder; wait for it or give --output"
-                ) from None
+                used = "another run is using this folder; wait for it or give --output"
+                raise UserError(f"{self.output}: {used}") from None
             for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield

@@ -22,8 +22,8 @@ from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.study import plan
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
-from holobench_eval.study.progress import watching
-from holobench_eval.study.run import run
+from holobench_eval.study.running.progress import watching
+from holobench_eval.study.running.run import run
 from tests.support.open_loop import Bench
 
 PAPER = (1080, 1920)

@@ -11,8 +11,7 @@ import pytest
 
 from holobench_eval.study.isolation import process
 from tests.cheats import attempts
-from tests.study.studies import write_green
-from tests.study.test_run import compute
+from tests.study.studies import compute, write_green
 
 NAMES = [
     name

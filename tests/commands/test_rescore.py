@@ -16,15 +16,16 @@ from holobench_eval.lab.session import read_manifest
 from holobench_eval.metrics import catalogue
 from holobench_eval.report import build_report
 from holobench_eval.report.data import scores
-from holobench_eval.study import executors, identity, provenance
+from holobench_eval.study import executors, identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import parted
 from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import plan
+from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from tests.commands import test_moved_session as sessions
 from tests.lab.session.running import run, succeed
-from tests.study.test_rescore import BOTH, ONE, PICTURE, cells, forget
+from tests.study.running.test_rescore import BOTH, ONE, PICTURE, cells, forget
 from tests.support import another_metric
 from tests.support.another_metric import COLUMN, NAME
 from tests.support.trained_study import compute

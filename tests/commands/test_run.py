@@ -8,9 +8,10 @@ import pytest
 
 from holobench_eval.commands.run import Sheet, _is_finished, _panel, draw_sheets, replaced, sheets
 from holobench_eval.report.charts import sheet as charts
-from holobench_eval.study import opening, provenance
+from holobench_eval.study import opening
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
+from holobench_eval.study.running import provenance
 from tests.support.fake_study import write_config
 
 

@@ -27,13 +27,13 @@ from holobench_eval.report.data.layout import layout_of
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.report.files import write_files
-from holobench_eval.study import run as running
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
+from holobench_eval.study.running import run as running
+from holobench_eval.study.running.progress import Lines
 from tests.faults import devices
 from tests.faults.counts import note, taken
 

@@ -12,11 +12,11 @@ from tests.faults.campaign import KINDS, Count, Kind, study, without_fault
 
 ELSEWHERE = {  # what goes the way of a fault that is tried here, or is shown by a test of its own
     "the run is told to end",
-    "the run is interrupted",  # tests/study/test_kill_and_resume.py
+    "the run is interrupted",  # tests/study/running/test_kill_and_resume.py
     "the run is killed",
     "a worker or a method's process aborts",
     "a call of a method is stopped",  # tests/cheats
-    "the Dask scheduler is killed",  # tests/study/test_clusters.py
+    "the Dask scheduler is killed",  # tests/study/executors/test_clusters.py
     "the panel vanishes",
     "the run on devices is killed",
     "a file of the results on devices is damaged",

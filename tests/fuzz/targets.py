@@ -28,7 +28,7 @@ from holobench_eval.report.compare.runs import records_of
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.isolation.messages import Channel
-from holobench_eval.study.provenance import read as read_provenance
+from holobench_eval.study.running.provenance import read as read_provenance
 from holobench_eval.study.store import SCHEMA, Record, Store
 from tests.support.bayer import bayer_dng
 

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Task, plan
+from holobench_eval.study.executors import Executor, Serial
+from holobench_eval.study.plan import Plan, Task, plan
+from holobench_eval.study.running.progress import Lines
+from holobench_eval.study.running.run import Outcome, run
+from tests.support.fake_study import install
 
 MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
 
@@ -56,3 +63,42 @@ def tasks_of(config: Path) -> dict[str, list[Task]]:
     for task in plan(load_study(config)).tasks:
         tasks.setdefault(task.label, []).append(task)
     return tasks
+
+
+def write_ideal(path: Path, *changes: tuple[str, str]) -> None:
+    """The ideal profile in a file, with pieces exchanged."""
+    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
+    path.write_text(exchanged(text, *changes))
+
+
+def add_other_profile(folder: Path) -> None:
+    write_ideal(folder / "other.yaml", ("name: ideal", "name: other"))
+
+
+def add_one_laser(folder: Path) -> None:
+    add_other_profile(folder)
+    laser = ("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.32e-7]")
+    write_ideal(folder / "one.yaml", ("name: ideal", "name: one"), laser)
+
+
+TURNS = Serial(workers=2)
+"""Says that it has two workers; what they compute takes turns."""
+
+
+def compute_faked(config: Path, output: Path) -> None:
+    """Run a study with the fakes, in a process that a test kills."""
+    install()
+    compute(config, output)
+
+
+def compute(
+    config: Path,
+    output: Path,
+    write: Callable[[str], None] = lambda line: None,
+    executor: Executor | None = None,
+    grid: Plan | None = None,
+    **options: Any,
+) -> Outcome:
+    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder."""
+    study, artifacts = load_study(config), output.parent / "artifacts"
+    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, artifacts, **options)

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory
+from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory, read_log
 from holobench_eval.study.displays import Preparation
 from tests.support.trained_study import (
     artifact_of,
@@ -61,7 +61,7 @@ def needed(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
         (
             {"wavelengths": (6.36e-7, 5.32e-7, 4.46e-7)},
             1,
-            "wavelengths [6.36e-07, 5.17e-07, 4.46e-07], this study needs [6.36e-07, 5.32e-07, 4.46e-07]",
+            "wavelengths [6.36e-07, 5.17e-07, 4.46e-07], this study needs",
         ),
         ({}, 2, "profile version 1, this study needs 2"),
     ],
@@ -73,7 +73,7 @@ def test_an_artifact_that_was_learned_for_another_display_is_refused(
     other, artifacts = replace(needed, display=display), Artifacts(tmp_path)
     artifacts.write(needed, {}, {"captures": 2, "seconds": 0.5})
     artifacts.folder_of(needed).rename(artifacts.folder_of(other))
-    with pytest.raises(UserError, match=re.escape(f"{artifacts.folder_of(other)}: trained for {words}; delete it, or")):
+    with pytest.raises(UserError, match=re.escape(f"{artifacts.folder_of(other)}: trained for {words}")):
         artifacts.load(other)
 
 
@@ -228,10 +228,6 @@ def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path
         memory.log(row)
     for again in ({"round": 1, "step": 10, "l1": 0.25}, {"round": 1, "fidelity": 21.0}):
         memory.log(again)
-    rows = [{key: value for key, value in row.items() if value} for row in memory.rows()]
-    assert rows == [
-        {"round": "1", "step": "10", "l1": "0.25"},
-        {"round": "1", "fidelity": "21"},
-        {"note": "x"},
-        {"note": "y"},
-    ]
+    rows = [{key: value for key, value in row.items() if value} for row in read_log(tmp_path)]
+    merged = [{"round": "1", "step": "10", "l1": "0.25"}, {"round": "1", "fidelity": "21"}]
+    assert rows == [*merged, {"note": "x"}, {"note": "y"}]

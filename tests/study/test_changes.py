@@ -117,7 +117,7 @@ def test_changes_are_read_back_as_they_were_noted() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_a_changed_study_says_so_in_its_report_and_leaves_the_whole_one_alone(
+def test_a_changed_study_says_so_and_leaves_the_whole_one_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -166,9 +166,7 @@ def test_every_config_of_the_repository_asks_its_question_and_says_what_would_ch
 
 
 @pytest.mark.parametrize(("panel", "enough"), [("[64, 64]", (118, 118)), ("[64, 256]", (118, 256))])
-def test_a_panel_that_is_too_small_gets_the_smallest_that_is_not(
-    tmp_path: Path, panel: str, enough: tuple[int, int]
-) -> None:
+def test_a_panel_that_is_too_small_gets_the_smallest_one(tmp_path: Path, panel: str, enough: tuple[int, int]) -> None:
     with pytest.raises(UserError, match=rf"at least 96, which a panel of \[{enough[0]}, {enough[1]}\] has$"):
         load_study(write(tmp_path, FULL.replace("[128, 256]", panel)))
     assert load_study(write(tmp_path, FULL.replace("[128, 256]", str(list(enough))))).display.panel == enough

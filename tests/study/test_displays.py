@@ -8,8 +8,12 @@ import pytest
 from holobench_eval import display
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.study import opening
+from holobench_eval.study.config import load_study
+from holobench_eval.study.definition import Study
 from holobench_eval.study.displays import condition
 from holobench_eval.study.opening import open_display
+from holobench_eval.study.plan import Task, plan
+from tests.support.fake_study import write_config
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
 
@@ -48,3 +52,79 @@ def test_a_failed_calibration_is_found_out_once(tmp_path: Path, monkeypatch: pyt
         with pytest.raises(CellError, match="no circles found"):
             open_display(shown, seed=0)
     assert len(opened) == 1
+
+
+SWEEPS = """sweeps:
+  - {condition: drift, values: [0, 30]}
+  - {condition: known_eye, values: ["-2"]}
+"""
+
+
+def study_with(folder: Path, sweeps: str, *methods: str) -> Study:
+    config = write_config(folder, methods or ("plugins.py:Toy",), count=1)
+    config.write_text(config.read_text() + sweeps)
+    return load_study(config)
+
+
+def solutions(study: Study) -> list[Task]:
+    return [task for task in plan(study).tasks if not task.is_floor]
+
+
+def test_a_blind_method_is_solved_once_for_changes_it_does_not_know_and_a_seeing_one_under_each(tmp_path: Path) -> None:
+    tasks = solutions(study_with(tmp_path, SWEEPS))
+    conditions = [[cell.condition for cell in task.cells] for task in tasks]
+    assert conditions == [["ideal", "ideal, drift 30 days"], ["ideal, known eye -2"]]
+    assert tasks[1].conditions[0].spec.eye == pytest.approx((0.05, 0.05, 0))
+    for method in ("plugins.py:Seeing", "oracle"):
+        assert [len(task.cells) for task in solutions(study_with(tmp_path, SWEEPS, method))] == [1, 1, 1]
+
+
+def test_a_trained_method_is_trained_once_before_any_change(tmp_path: Path) -> None:
+    grid = plan(study_with(tmp_path, SWEEPS, "parametric_model"))
+    assert len(grid.preparations()) == 1
+    assert {task.preparation.display.change for task in grid.tasks if task.preparation} == {None}
+
+
+def test_the_nominal_value_is_the_unchanged_cell_and_any_other_value_another(tmp_path: Path) -> None:
+    plain, swept, other = (plan(study_with(tmp_path, text)) for text in ("", SWEEPS, SWEEPS.replace("30", "31")))
+    assert {cell.id for cell in plain.cells} <= {cell.id for cell in swept.cells}
+    assert len({cell.id for cell in swept.cells} ^ {cell.id for cell in other.cells}) == 2
+    changed = [cell for cell in swept.cells if cell.change]
+    assert [dict(cell.change) for cell in changed] == [{"drift": 30.0}, {"known_eye": "-2"}]
+    assert all(cell.description()["display"]["change"] for cell in changed)
+    assert not any("change" in cell.description().get("display", {}) for cell in plain.cells)
+
+
+def test_a_count_of_siblings_is_a_list_of_names(tmp_path: Path) -> None:
+    study = study_with(tmp_path, "sweeps: [{condition: sibling, count: 3}]\n")
+    assert study.sweeps[0].values == ("1", "2", "3")
+
+
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        ("{condition: drfit, values: [1]}", "unknown condition 'drfit'; did you mean 'drift'?"),
+        ("{condition: drift, values: [-1]}", "drift is a number [days] from 0 to 3650, got -1"),
+        ("{condition: drift, values: [1, 2, 1.0]}", "drift 1.0 is listed twice"),
+        ("{condition: drift}", "a sweep has values"),
+        ("{condition: sensor, values: [nikon]}", "unknown camera 'nikon'"),
+        ("{condition: eye, values: [blind]}", "prescription 'blind'"),
+        ("{condition: drift, values: [1], profiles: [leto]}", "'leto' is not in display.profiles"),
+    ],
+)
+def test_a_sweep_that_means_nothing_is_one_line_with_its_place(tmp_path: Path, sweep: str, message: str) -> None:
+    with pytest.raises(UserError, match=r"study.yaml:\d+:\d+: ") as refused:
+        study_with(tmp_path, f"sweeps:\n  - {sweep}\n")
+    assert message in str(refused.value)
+
+
+def test_a_display_is_opened_once_for_every_change(tmp_path: Path) -> None:
+    place = condition("ideal", (128, 128), tmp_path)
+    grid = plan(study_with(tmp_path, SWEEPS))
+    shown = {place.title: place for task in grid.tasks for place in task.conditions}
+    benches = {title: open_display(place, 5) for title, place in shown.items()}
+    assert open_display(shown["ideal"], 5) is benches["ideal"]
+    assert benches["ideal, drift 30 days"].bench.profile.drift.days == 30
+    assert benches["ideal, known eye -2"].registration is benches["ideal"].registration
+    assert benches["ideal, drift 30 days"].registration is not benches["ideal"].registration
+    assert place.change is None

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
+from holobench_eval.methods.calibrated.parametric import ParametricModel
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study import identity
+from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.config import load_study
+from holobench_eval.study.displays import Preparation
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.versions import GIVEN, GIVEN_GRAY
-from tests.study.studies import exchanged
-from tests.support import another_metric
+from tests.study.studies import exchanged, write_ideal
+from tests.support import another_metric, fake_trained
 
 CONFIG = """\
 title: "Names"
@@ -31,16 +36,10 @@ methods:
 BLIND, CAMERA, PRIVILEGED, TRAINED = METHODS = ("wirtinger", "online_camera", "oracle", "double_phase_gamma")
 
 
-def write_profile(folder: Path, file: str = "mine.yaml", *changes: tuple[str, str]) -> None:
-    """The ideal profile in a file, with pieces exchanged."""
-    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
-    (folder / file).write_text(exchanged(text, *changes))
-
-
 def grid(folder: Path, method: str = BLIND, *changes: tuple[str, str]) -> Plan:
     """The plan of a study of one method, with pieces of its config exchanged."""
     if not (folder / "mine.yaml").exists():
-        write_profile(folder)
+        write_ideal(folder / "mine.yaml")
     (folder / "study.yaml").write_text(exchanged(CONFIG.replace("METHOD", method), *changes))
     planned = plan(load_study(folder / "study.yaml"))
     assert all(cell.id and cell.phase_id for cell in planned.cells)  # now, and not after the test has changed something
@@ -91,9 +90,7 @@ def test_every_repeat_has_a_phase_of_its_own(tmp_path: Path) -> None:
     assert len({cell.phase_id for cell in repeats}) == len(repeats) == 2 * 3
 
 
-def test_another_version_of_a_method_or_another_of_the_same_code_makes_another_phase(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_or_method_makes_another_phase(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kinds = ("double_phase", "double_phase_aa", "double_phase_bl")
     assert len({first(grid(tmp_path, kind)).phase_id for kind in kinds}) == 3
     before = first(grid(tmp_path))
@@ -107,17 +104,15 @@ def test_another_version_of_a_method_or_another_of_the_same_code_makes_another_p
 @pytest.mark.parametrize("optics", [("distance: 0.1 ", "distance: 0.2 "), ("pitch: 6.4e-6", "pitch: 8.0e-6")])
 def test_other_nominal_optics_make_another_phase(tmp_path: Path, optics: tuple[str, str]) -> None:
     before = first(grid(tmp_path))
-    write_profile(tmp_path, "mine.yaml", optics)
+    write_ideal(tmp_path / "mine.yaml", optics)
     assert first(grid(tmp_path)).phase_id != before.phase_id
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_another_display_of_the_same_optics_makes_another_capture_and_another_phase_where_it_is_seen(
-    tmp_path: Path, method: str
-) -> None:
+def test_another_display_of_the_same_optics_makes_another_phase_where_it_is_seen(tmp_path: Path, method: str) -> None:
     before = first(grid(tmp_path, method))
     for change in (("name: ideal", "name: another"), ("version: 1", "version: 2")):
-        write_profile(tmp_path, "mine.yaml", change)
+        write_ideal(tmp_path / "mine.yaml", change)
         after = first(grid(tmp_path, method))
         assert before.id != after.id
         assert (before.phase_id == after.phase_id) == (method == BLIND)
@@ -150,9 +145,7 @@ def described(**changes: Any) -> Mapping[str, Any]:
     return identity.phase(**(given | {"draw": (1, "a", 0)} | changes))
 
 
-def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase_and_nothing_else_costs_one() -> (
-    None
-):
+def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase() -> None:
     plain = described()
     assert described(files={}, learned="", planes=[], display={}, captures=None, predicts=None) == plain
     assert described(files={"phases.npy": "1"}) != described(files={"phases.npy": "2"}) != plain
@@ -212,3 +205,95 @@ def test_a_display_of_one_wavelength_has_its_own_version_of_what_a_method_is_giv
     given = [identity.basis({}, each, ())["given"] for each in (spec, gray)]
     assert given == [GIVEN, GIVEN_GRAY]
     assert len(set(given)) == 2
+
+
+LEARNS = "parametric_model"
+ROW, IMAGES = "{name: parametric_model, label: row}", "params: {count: 3}, held_out: 1"
+
+
+def needs(folder: Path, *changes: tuple[str, str]) -> list[Preparation]:
+    """What has to be learned for a study of a trained method, with pieces of its config exchanged."""
+    return list(grid(folder, LEARNS, *changes).preparations().values())
+
+
+def artifact_id(folder: Path, *changes: tuple[str, str]) -> str:
+    (needed,) = needs(folder, *changes)
+    return needed.id
+
+
+def test_what_a_state_depends_on_makes_another_artifact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = [
+        ("seed: 3", "seed: 4"),
+        ("panel: [128, 128]", "panel: [128, 192]"),
+        ("[mine.yaml]", "[leto-mild]"),
+        ("held_out: 1", "held_out: 2"),
+        ("held_out: 1", "held_out: 1, captures: 100"),
+        ("dead_leaves", '"trained.py:Unseen"'),
+        (IMAGES, "params: {count: 4}, held_out: 1"),
+        (IMAGES, "params: {count: 3, seed: 1}, held_out: 1"),
+        (ROW, "{name: parametric_model, params: {training: {rounds: 3}}}"),
+        (ROW, "learned_kernel"),
+    ]
+    shutil.copy(fake_trained.__file__, tmp_path / "trained.py")
+    found = [artifact_id(tmp_path), *(artifact_id(tmp_path, change) for change in changes)]
+    for change in ("version: 1", "version: 2"), ("5.17e-7", "5.32e-7"), ("noise: false", "noise: true"):
+        write_ideal(tmp_path / "mine.yaml", change)
+        found.append(artifact_id(tmp_path))
+    write_ideal(tmp_path / "mine.yaml")
+    monkeypatch.setattr(ParametricModel, "version", 99)
+    found.append(artifact_id(tmp_path))
+    assert len(set(found)) == len(found)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('"Names"', '"Other words"'),
+        ("[tv_lines, gray_ramp]", "[tv_lines]"),
+        ("seed: 3", "seed: 3\nrepeats: 2"),
+        ("seed: 3", "seed: 3\nheadline: ssim_linear"),
+        ("seed: 3", "seed: 3\nmeasure: prediction"),
+        ("seed: 3", "seed: 3\nsave: {captures: true}"),
+        ("panel: [128, 128]", "panel: [128, 128], exposure: matched"),
+        ("label: row", "label: other"),
+        (ROW, f"{ROW}\n  - wirtinger"),
+    ],
+)
+def test_nothing_else_does(tmp_path: Path, change: tuple[str, str]) -> None:
+    assert artifact_id(tmp_path, change) == artifact_id(tmp_path)
+
+
+def test_the_version_of_a_shipped_method_is_told(tmp_path: Path) -> None:
+    (needed,) = needs(tmp_path)
+    assert needed.description()["version"] == f"ParametricModel {ParametricModel.version}"
+
+
+def test_every_display_is_learned_for_itself_and_once(tmp_path: Path) -> None:
+    planned = grid(tmp_path, LEARNS, ("[mine.yaml]", "[ideal, leto-mild]"))
+    assert sorted(needed.display.name for needed in planned.preparations().values()) == ["ideal", "leto-mild"]
+    for task in planned.tasks:
+        if not task.is_floor:
+            assert task.preparation is not None
+            assert [cell.prepared for cell in task.cells] == [(task.preparation.id,)]
+            assert task.preparation.display.name == task.conditions[0].name
+
+
+def test_a_method_that_learns_nothing_needs_nothing(tmp_path: Path) -> None:
+    assert not grid(tmp_path, BLIND).preparations()
+
+
+def test_a_description_is_plain_and_names_a_folder_inside_that_of_the_artifacts(tmp_path: Path) -> None:
+    write_ideal(tmp_path / "mine.yaml", ("name: ideal", 'name: "../../up"'))
+    (needed,) = needs(tmp_path)
+    assert json.loads(json.dumps(needed.description())) == needed.description()
+    assert Artifacts(tmp_path / "artifacts").folder_of(needed).parent == tmp_path / "artifacts"
+
+
+def test_images_that_nobody_trains_on_may_be_scored(tmp_path: Path) -> None:
+    targets = "charts, params: {names: [tv_lines, gray_ramp]}"
+    assert grid(tmp_path, BLIND, ("dead_leaves, params: {count: 3}", targets)).cells
+
+
+def test_held_out_images_leave_some_to_train_on(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"study\.yaml:5:\d+: training\.held_out 3 leaves nothing of 3 images"):
+        grid(tmp_path, LEARNS, ("held_out: 1", "held_out: 3"))

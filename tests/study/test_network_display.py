@@ -102,39 +102,21 @@ def linked(folder: Path) -> None:
     (folder / "net.pt").symlink_to(outside)
 
 
-def without_state(folder: Path) -> None:
+def save(folder: Path, held: Any) -> None:
     """The file of a hostile hand, whose size and digest are right."""
-    torch.save({"state": [1]}, folder / "net.pt")
-    described(folder)
-
-
-def without_end(folder: Path) -> None:
-    endless: list[Any] = []
-    endless.append(endless)
-    torch.save({"state": {"model": endless}}, folder / "net.pt")
-    described(folder)
-
-
-def without_values(folder: Path) -> None:
-    torch.save({"state": {"model": {"table": torch.empty(3, 17, device="meta")}}}, folder / "net.pt")
-    described(folder)
-
-
-def of_code(folder: Path) -> None:
-    torch.save({"state": Wirtinger()}, folder / "net.pt")
-    described(folder)
+    torch.save({"state": held}, folder / "net.pt")
+    content = (folder / "net.pt").read_bytes()
+    rewrite(folder / "net.yaml", network={"size": len(content), "sha256": hashlib.sha256(content).hexdigest()})
 
 
 def rewritten(folder: Path, change: Callable[[torch.Tensor], torch.Tensor]) -> None:
     held = state(load_profile("net.yaml"))
-    held["model"] = {key: change(values) for key, values in held["model"].items()}
-    torch.save({"state": held}, folder / "net.pt")
-    described(folder)
+    save(folder, held | {"model": {key: change(values) for key, values in held["model"].items()}})
 
 
-def described(folder: Path) -> None:
-    content = (folder / "net.pt").read_bytes()
-    rewrite(folder / "net.yaml", network={"size": len(content), "sha256": hashlib.sha256(content).hexdigest()})
+ENDLESS: list[Any] = []
+ENDLESS.append(ENDLESS)
+EMPTY = {"model": {"table": torch.empty(3, 17, device="meta")}}
 
 
 FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
@@ -142,10 +124,10 @@ FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
     "no file": (lambda folder: (folder / "net.pt").unlink(), "cannot be read"),
     "a link": (linked, "is a link that leaves the profile's folder"),
     "a place outside": (lambda folder: rewrite(folder / "net.yaml", network={"file": "../net.pt"}), "is not a file in"),
-    "no state": (without_state, "holds nothing that a method has learned"),
-    "a list in itself": (without_end, "not what parametric_model has learned"),
-    "tensors without values": (without_values, "not what parametric_model has learned"),
-    "code": (of_code, "damaged, or not a file of tensors"),
+    "no state": (lambda folder: save(folder, [1]), "holds nothing that a method has learned"),
+    "a list in itself": (lambda folder: save(folder, {"model": ENDLESS}), "not what parametric_model has learned"),
+    "tensors without values": (lambda folder: save(folder, EMPTY), "not what parametric_model has learned"),
+    "code": (lambda folder: save(folder, Wirtinger()), "damaged, or not a file of tensors"),
     "other shapes": (lambda folder: rewritten(folder, lambda values: values[..., :1]), "not what parametric_model has"),
     "no numbers": (lambda folder: rewritten(folder, lambda values: values * float("nan")), "that are not finite"),
     "other code": (lambda folder: rewrite(folder / "net.yaml", network={"version": "X 1"}), "learn it again"),

@@ -15,11 +15,9 @@ from holobench_eval.study.cost import Cost
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
 from holobench_eval.study.plan import plan
-from holobench_eval.study.run import Outcome
+from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.study.studies import exchanged
-from tests.study.test_identity import write_profile
-from tests.study.test_run import TWO, compute
+from tests.study.studies import TURNS, compute, exchanged, write_ideal
 from tests.support import trained_study
 from tests.support.fake_study import solves, untimed, write_config
 
@@ -51,7 +49,7 @@ def write_study(folder: Path, displays: int = 1, *changes: tuple[str, str]) -> P
     """A study of double phase on displays of the same optics, with pieces of its config exchanged."""
     names = [f"display{number}" for number in range(displays)]
     for name in names:
-        write_profile(folder, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+        write_ideal(folder / f"{name}.yaml", ("name: ideal", f"name: {name}"))
     text = CONFIG.replace("PROFILES", ", ".join(f"{name}.yaml" for name in names))
     (folder / "study.yaml").write_text(exchanged(text, *changes))
     return folder / "study.yaml"
@@ -71,9 +69,7 @@ def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_p
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_study_beside_uses_the_phases_that_another_has_solved_and_solves_the_repeats_that_are_new(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: Path, found: list[str]) -> None:
     results = tmp_path / RESULTS
     first = compute(write_study(tmp_path), results / "a")
     second = compute(write_study(tmp_path, 3), results / "b", executor=Serial())
@@ -96,7 +92,7 @@ def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
 @pytest.mark.usefixtures("no_physics")
 def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        write_profile(tmp_path, f"{name}.yaml", ("name: ideal", f"name: {name}"))
+        write_ideal(tmp_path / f"{name}.yaml", ("name: ideal", f"name: {name}"))
     config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
     assert compute(config, tmp_path / RESULTS / "a").solved == 2
     assert compute(config, tmp_path / RESULTS / "b").solved == 0
@@ -104,9 +100,7 @@ def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(t
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_phase_whose_file_is_lost_or_damaged_is_solved_again_to_the_same_scores(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path: Path, found: list[str]) -> None:
     config, output = write_study(tmp_path), tmp_path / "out"
     before = scores(compute(config, output))
     cells = [cell for cell in plan(load_study(config)).cells if cell.code]
@@ -159,17 +153,15 @@ def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_run_that_shared_the_machine(
-    tmp_path: Path, found: list[str]
-) -> None:
+def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path: Path, found: list[str]) -> None:
     results = tmp_path / RESULTS
-    shared = compute(write_study(tmp_path), results / "a", executor=TWO)
+    shared = compute(write_study(tmp_path), results / "a", executor=TURNS)
     config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))
-    alone = compute(config, results / "b", executor=TWO)
+    alone = compute(config, results / "b", executor=TURNS)
     assert found == ["tv_lines", "gray_ramp", "gray_ramp"]
     assert [(record["alone"], record["reused"]) for record in alone.records[-2:]] == [(False, True), (True, False)]
     assert scores(alone) == scores(shared)
-    compute(config, results / "c", executor=TWO)  # what was timed alone once need not be again
+    compute(config, results / "c", executor=TURNS)  # what was timed alone once need not be again
     assert len(found) == 3
 
 

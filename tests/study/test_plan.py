@@ -5,7 +5,7 @@ from pathlib import Path
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
-from tests.study.test_run import add_one_laser, add_other_profile
+from tests.study.studies import add_one_laser, add_other_profile
 from tests.support.fake_study import write_config
 
 
@@ -29,9 +29,7 @@ def test_a_method_on_some_displays_has_cells_on_those_only(tmp_path: Path) -> No
     assert [cell.condition for cell in grid.cells] == [REFERENCE] * 5 + ["other"]
 
 
-def test_a_blind_method_is_solved_once_for_displays_of_equal_nominal_optics_and_one_that_sees_them_on_each(
-    tmp_path: Path,
-) -> None:
+def test_a_blind_method_is_solved_once_for_displays_of_equal_optics_and_a_seeing_one_on_each(tmp_path: Path) -> None:
     add_other_profile(tmp_path)
 
     def solved(method: str = "plugins.py:Toy") -> list[int]:

@@ -103,7 +103,7 @@ def test_a_damaged_record_is_named(store: Store, grid: Plan, fault: str) -> None
     assert len(str(error.value)) < 400
 
 
-def test_planned_cells_without_a_record_are_missing_and_records_of_other_studies_are_left_alone(
+def test_cells_without_a_record_are_missing_and_records_of_other_studies_are_left_alone(
     store: Store, grid: Plan
 ) -> None:
     store.write(record_of(grid))
@@ -120,9 +120,7 @@ def test_planned_cells_without_a_record_are_missing_and_records_of_other_studies
         ({"scores": psnr(float("inf"))}, "finite numbers"),  # which JSON cannot hold
     ],
 )
-def test_what_could_not_be_read_again_is_not_written(
-    store: Store, grid: Plan, wrong: dict[str, Any], message: str
-) -> None:
+def test_what_could_not_be_read_is_not_written(store: Store, grid: Plan, wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         store.write(record_of(grid, **wrong))
     assert not list(store.folder.glob("*.json"))
@@ -172,21 +170,19 @@ def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(store: S
     assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
 
 
-def test_the_state_of_a_cell_is_that_of_its_record_unless_it_has_to_be_timed_or_scored(
-    store: Store, grid: Plan
-) -> None:
+def test_the_state_of_a_cell_is_that_of_its_record_unless_it_is_to_be_timed_or_scored(store: Store, grid: Plan) -> None:
     first, second, third, fourth, *rest = grid.cells
     store.write(Record(first.description(), "failed", "Toy", reason="ZeroDivisionError"))
     store.write(Record(second.description(), "done", "Toy", alone=False, scores=psnr(20.0)))
     store.write(Record(third.description(), "skipped", "Toy", reason="no camera"))
     store.write(Record(fourth.description(), "done", "Toy", alone=True, scores=psnr(20.0, "v2, 0")))
 
-    def states(*timed: Cell, metrics: Mapping[str, str] | None = None) -> list[str]:
+    def states(*timed: Cell, metrics: Mapping[str, str]) -> list[str]:
         return [*store.states(grid.cells, frozenset(cell.id for cell in timed), metrics).values()]
 
     missing = ["missing"] * len(rest)
-    assert states() == ["failed", "done", "skipped", "done", *missing]
-    assert states(second, third, fourth) == ["failed", "untimed", "skipped", "done", *missing]
+    assert states(metrics={}) == ["failed", "done", "skipped", "done", *missing]
+    assert states(second, third, fourth, metrics={}) == ["failed", "untimed", "skipped", "done", *missing]
     today = {"psnr": identity.versions()["psnr"]}
     assert states(metrics=today) == ["failed", "done", "skipped", "unscored", *missing]
     assert states(second, metrics=today | {"ssim": "v2, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]

@@ -1,9 +1,10 @@
 from __future__ import annotations
 
 import json
-import signal
+import shutil
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,23 @@ import pytest
 import torch
 
 from holobench_eval.core.io import TEMPORARY
-from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress
+from holobench_eval.display import load_profile
+from holobench_eval.display.simulated.ground_truth import truth
+from holobench_eval.display.simulated.pipeline import SimulatedBench
+from holobench_eval.study import training
+from holobench_eval.study.artifacts import PROVENANCE, STATE, Artifacts, FolderMemory, progress, read_log
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
-from holobench_eval.study.executors.processes import start
+from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Follower, Lines
-from holobench_eval.study.run import run
+from holobench_eval.study.running.progress import Follower, Lines
+from holobench_eval.study.running.run import run
+from holobench_eval.study.store import Store
 from holobench_eval.study.training import TrainingJob
+from tests.study import studies
 from tests.support import fake_study
-from tests.support.patience import PATIENCE
+from tests.support.fake_study import write_config
+from tests.support.patience import killed_at, wait_until
 from tests.support.trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -38,7 +46,7 @@ def gain(**params: object) -> tuple[str, str]:
     return '"trained.py:Gain"', json.dumps({"name": "trained.py:Gain", "params": params})
 
 
-def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
+def test_a_spent_budget_fails_its_cells_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = write(tmp_path, BESIDE, gain(rounds=4), ("held_out: 1", "held_out: 1, captures: 3"))
@@ -54,10 +62,8 @@ def test_a_spent_budget_leaves_failed_cells_with_the_reason_and_all_other_cells(
     assert reason.endswith("not trained: trained.py:Gain has used its 3 captures for training")
     assert "\n" not in reason
     table = pd.read_csv(tmp_path / "out" / "table.csv").query("category != 'floor'")
-    assert table[["label", "condition", "n", "failed"]].values.tolist() == [
-        ["Even", "ideal", 1, 0],
-        ["Gain", "ideal", 0, 1],
-    ]
+    rows = table[["label", "condition", "n", "failed"]].values.tolist()
+    assert rows == [["Even", "ideal", 1, 0], ["Gain", "ideal", 0, 1]]
 
 
 def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path: Path) -> None:
@@ -138,25 +144,11 @@ def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:
     assert state == {"held out": 2}
 
 
-def compute_apart(config: Path) -> None:
-    """Compute with the fakes in a process that a test kills."""
-    fake_study.install()
-    compute(config)
-
-
 @pytest.mark.slow
 def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_that_was_not(tmp_path: Path) -> None:
     config = write(tmp_path, gain(rounds=5, pause=0.15))
     place = artifact_of(config)
-    killed = start(compute_apart, config)
-    deadline = time.monotonic() + PATIENCE
-    while progress(place)[0] != 3:
-        assert killed.is_alive()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    killed.kill()
-    killed.join()
-    assert killed.exitcode == -signal.SIGKILL
+    killed_at(lambda: progress(place)[0] == 3, studies.compute_faked, config, tmp_path / "out")
     assert not (place / STATE).exists()
     (place / "unfinished" / f"{TEMPORARY}left").write_bytes(b"half")
     (place / f"{TEMPORARY}left").write_bytes(b"half")
@@ -175,7 +167,7 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     assert known[1]["captures"] == 5
     assert known[0]["description"] == known[1]["description"]
     assert known[0]["seconds"] >= 5 * 0.15 - 0.05  # the rounds before the kill count too
-    logs = [FolderMemory(one).rows() for one in (place, artifact_of(again))]
+    logs = [read_log(one) for one in (place, artifact_of(again))]
     assert [[row["round"] for row in log] for log in logs] == [list("01234")] * 2
     assert [row["gain"] for row in logs[0]] == [row["gain"] for row in logs[1]]
     assert list(place.rglob(f"{TEMPORARY}*")) == []
@@ -203,10 +195,7 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     follower.start([(name, log.folder) for name, log in logs.items()], told.append)
 
     def tells(line: str) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while line not in told:
-            assert time.monotonic() < deadline, (line, told)
-            time.sleep(0.005)
+        wait_until(lambda: line in told)
 
     logs["one"].log({"round": 0, "step": 5, "l1": 0.25})
     tells("one: round 0, step 5, l1 0.25")
@@ -235,3 +224,118 @@ def test_a_run_says_what_it_trains_and_when_it_has(tmp_path: Path) -> None:
     again: list[str] = []
     compute(write(tmp_path, ("count: 1", "count: 2")), "other", write=again.append)
     assert not any("train" in line for line in again)
+
+
+TELLING = """
+
+@dataclass(frozen=True)
+class Telling(Gain):
+    form: ClassVar[frozenset[str]] = FORM
+
+    def estimates(self, learned, spec):
+        return [estimate("phase_gain", colour, float(learned["gain"][colour])) for colour in range(3)]
+"""
+
+
+@pytest.fixture
+def known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fake display has a truth: that of the ideal one."""
+    profile = load_profile("ideal").scaled((64, 64))
+    monkeypatch.setattr(fake_study.FakeBench, "profile", profile, raising=False)
+    monkeypatch.setattr(training, "truth", lambda _: truth(SimulatedBench(profile)))
+
+
+def provenance(folder: Path, form: str) -> dict[str, Any]:
+    """Of the training of a method that tells something."""
+    config = write(folder, ("trained.py:Gain", "trained.py:Telling"))
+    plugins = folder / "trained.py"
+    imports = f"from holobench_eval.display.estimates import estimate\n\nFORM = frozenset({form})\n"
+    plugins.write_text(plugins.read_text().replace("LOG = ", f"{imports}LOG = ", 1) + TELLING)
+    assert compute(config).failed == 0
+    return dict(json.loads((artifact_of(config) / PROVENANCE).read_text()))
+
+
+@pytest.mark.usefixtures("known")
+@pytest.mark.parametrize(("form", "missing"), [("[]", ["phase in steps of 2 pi / 256"]), ("['quantisation']", [])])
+def test_estimates_are_kept_beside_the_truth_and_what_is_missing(tmp_path: Path, form: str, missing: list[str]) -> None:
+    kept = provenance(tmp_path, form)
+    rows = kept["estimates"]
+    assert [(row["name"], row["colour"]) for row in rows] == [("phase_gain", colour) for colour in range(3)]
+    assert [row["truth"] for row in rows] == pytest.approx([1, 1, 1], abs=1e-5)
+    assert all(isinstance(row["value"], float) and row["value"] != row["truth"] for row in rows)
+    assert kept["missing"] == missing
+
+
+PHOTOGRAPHING = """
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import torch
+
+
+@dataclass(frozen=True)
+class Mine:
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.zeros(*target.shape[:2], *bench.spec.shape)
+        for _ in range(2):
+            bench.capture(phase[0])
+        if Path(__file__).with_name("fail").exists():
+            raise ValueError("no light")
+        return phase
+"""
+
+
+@pytest.fixture
+def records(tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
+    """Runs a study of one target with a method that takes two captures; its record."""
+    (tmp_path / "mine.py").write_text(PHOTOGRAPHING)
+    config = write_config(tmp_path, ('"mine.py:Mine"',), count=1)
+    config.write_text(f"{config.read_text()}isolation: none\n")
+
+    def run(**options: Any) -> list[dict[str, Any]]:
+        found = studies.compute(config, tmp_path / "out", **options).records
+        return [record for record in found if record["label"] == "Mine"]
+
+    return run
+
+
+def test_a_failed_cell_has_its_captures_and_a_retry_those_of_both_and_a_new_solution_after_a_score_its_own(
+    tmp_path: Path, records: Callable[..., list[dict[str, Any]]]
+) -> None:
+    fault, found = tmp_path / "fail", list[tuple[str, int]]()
+    fault.touch()
+    for number in range(3):
+        if number == 2:
+            fault.unlink()
+        found += [(record["state"], record["captures"]) for record in records(retry_failed=True)]
+    assert found == [("failed", 2), ("failed", 4), ("done", 6)]
+    assert list((tmp_path / "out").rglob("*.captures")) == []
+    for folder in (Store(tmp_path / "out").folder, phases_of(tmp_path / "out").folder):
+        shutil.rmtree(folder)
+    assert [record["captures"] for record in records()] == [2]
+
+
+def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_made_anew_its_own(tmp_path: Path) -> None:
+    config = write(tmp_path)
+    plugins = tmp_path / "trained.py"
+    dark = 'if number == 1 and Path(__file__).with_name("dark").exists():\n                raise ValueError("dark")\n'
+    text = plugins.read_text().replace('return {"capture"', f'{dark}            return {{"capture"')
+    future = "from __future__ import annotations\n"
+    plugins.write_text(text.replace(future, f"{future}from pathlib import Path\n"))
+    (tmp_path / "dark").touch()
+    assert compute(config).failed == 1
+    assert progress(artifact_of(config))[0] == 2
+    (tmp_path / "dark").unlink()
+    assert compute(config, retry_failed=True).failed == 0
+    assert captures(config) == 3
+    assert [row["captures"] for row in read_log(artifact_of(config))] == ["1", "3"]
+    compute(config, retrain=True)
+    assert captures(config) == 2
+
+
+def captures(config: Path) -> int:
+    """Of the one artifact of a study."""
+    return int(json.loads((artifact_of(config) / PROVENANCE).read_text())["captures"])

@@ -57,9 +57,7 @@ def finish(artifacts, needed, captures=7):
     artifacts.write(needed, {}, {"captures": captures, "seconds": 61.25})
 
 
-def test_logs_and_provenance_are_kept_beside_the_report_under_their_labels_while_they_are_needed(
-    study, artifacts, tmp_path
-):
+def test_logs_and_provenance_are_kept_beside_the_report_while_they_are_needed(study, artifacts, tmp_path):
     grid, output = plan(study), tmp_path / "out"
     first, second = grid.preparations().values()
     for needed in (first, second):

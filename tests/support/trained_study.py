@@ -3,7 +3,6 @@
 import shutil
 import sys
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import Preparation
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.progress import Lines
-from holobench_eval.study.run import Outcome, run
+from holobench_eval.study.running.progress import Lines
+from holobench_eval.study.running.run import Outcome, run
 from tests.support import fake_trained
 
 CONFIG = """\
@@ -41,20 +40,19 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def write_profile(folder: Path, *changes: tuple[str, str]) -> tuple[str, str]:
-    """The ideal profile in a file ``mine.yaml``, with pieces exchanged; the change of a config that names it."""
-    text = files("holobench_eval.display.simulated").joinpath("profiles", "ideal.yaml").read_text()
-    for old, new in (("name: ideal", "name: mine"), *changes):
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "mine.yaml").write_text(text)
-    return "[ideal]", "[mine.yaml]"
-
-
 def compute(config: Path, output: str = "out", write: Callable[[str], None] = print, **options: Any) -> Outcome:
     """Run a study in this process; artifacts are beside its config."""
     study, folder = load_study(config), config.parent
     return run(study, plan(study), folder / output, Serial(), Lines(write), 1, folder / "artifacts", **options)
+
+
+def computed(config: Path) -> list[dict[str, Any]]:
+    """The records of a study, all done, for several tests: its timings are beside it, not in the cache of one test."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(config.parent / "cache"))
+        records = compute(config).records
+    assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
+    return records
 
 
 def needs(config: Path) -> list[Preparation]:

@@ -30,7 +30,7 @@ def calibrate(
     from ...display import load_profile
     from ...study.calibration import load_calibration
     from ...study.calibration.fitting import Fitting
-    from ...study.progress import watching
+    from ...study.running.progress import watching
     from ..output import console
 
     screen = console()
@@ -59,7 +59,7 @@ def _family(name: str, draws: int, folder: Path, workers: int | None) -> None:
     from ...study.calibration.family import compute, load_family
     from ...study.calibration.posterior import members, middle, write_member
     from ...study.executors import executor
-    from ...study.progress import SECONDS_BETWEEN_LINES, duration
+    from ...study.running.progress import SECONDS_BETWEEN_LINES, duration
     from ..output import console
 
     family, screen, began, last = load_family(name), console(), time.monotonic(), 0.0

@@ -46,7 +46,7 @@ def check(
 
 def problems_in(folder: Path) -> tuple[int, list[str]]:
     """Number of reports (``reports_in``), and a line for all that no longer holds. UserError: no reports."""
-    from ...study import provenance
+    from ...study.running import provenance
 
     reports = reports_in(folder)
     if not reports:
@@ -57,8 +57,8 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
 def _earlier(folder: Path) -> Iterator[str]:
     """A line for each other version of the protocol by which reports were scored; they stand as they are."""
     from ...metrics.protocol import VERSION as PROTOCOL
-    from ...study import provenance
     from ...study.identity import parted
+    from ...study.running import provenance
 
     versions = Counter[str]()
     for report in reports_in(folder):
@@ -88,7 +88,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     from ...study.displays import displays
     from ...study.identity import parted, versions
     from ...study.plan import plan
-    from ...study.provenance import text_digest
+    from ...study.running.provenance import text_digest
 
     for display in displays(study).values():
         now = {"version": display.version, "sha256": display.digest}
@@ -124,7 +124,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
 
 def reports_in(folder: Path) -> list[Path]:
     """The reports of studies in a folder, or the folder itself where it is one."""
-    from ...study import provenance
+    from ...study.running import provenance
 
     if (folder / provenance.FILE).is_file():
         return [folder]
@@ -133,9 +133,9 @@ def reports_in(folder: Path) -> list[Path]:
 
 def finished(report: Path) -> tuple[Study, dict[str, Any]]:
     """The study of a report and its provenance. UserError: the report is not finished, or what of it is missing."""
-    from ...study import provenance
     from ...study.changes import recorded
     from ...study.config import load_study
+    from ...study.running import provenance
 
     known = provenance.read(report)
     lacking = [key for key in ("config", "config_sha256", "profiles", "scores") if key not in known]

@@ -39,7 +39,7 @@ def report(config: Config, output: Output = None) -> None:
 
 def load(config: Path, output: Path | None) -> Loaded:
     """Load what a report is written from. UserError: there are no records, or of another study or code."""
-    from ...study import provenance
+    from ...study.running import provenance
     from ...study.store import Store
 
     study, folder, grid = planned(config, output)

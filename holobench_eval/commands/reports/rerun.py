@@ -151,7 +151,7 @@ def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
 def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
     """Why cells cannot be computed again, by their ids; nothing for those that can."""
     from ...study.artifacts import Artifacts
-    from ...study.run import refuse_unscored
+    from ...study.running.run import refuse_unscored
 
     if study.display.real:
         return {each.cell.id: "photographs of a real display" for each in cells}
@@ -181,7 +181,7 @@ def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Pa
 def _unavailable(each: Planned, study: Study) -> str:
     """Why a cell's method cannot run here; empty if it can."""
     from ...study.plan import Plan
-    from ...study.run import refuse_unavailable
+    from ...study.running.run import refuse_unavailable
 
     try:
         refuse_unavailable(Plan((each.task,)), frozenset((each.cell.id,)), study.folder)
@@ -207,8 +207,8 @@ def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: E
     from ...report.data.tables import records_frame
     from ...study.identity import scores_of
     from ...study.plan import Plan
-    from ...study.progress import Lines
-    from ...study.run import run
+    from ...study.running.progress import Lines
+    from ...study.running.run import run
     from ...study.store import Record, Store
 
     wanted = {each.cell.id for each in chosen}

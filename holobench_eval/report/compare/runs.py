@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from ...core.errors import UserError, one_line
-from ...study import provenance
+from ...study.running import provenance
 from ..data.tables import read_records, records_text
 
 # What names a cell in records.csv whatever code computed it: the same in two runs of a study.

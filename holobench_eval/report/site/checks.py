@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
-from ...study import provenance
+from ...study.running import provenance
 from ..data.categories import CATEGORIES, FLOOR, OPEN_LOOP
 from ..data.scores import METRICS, parse
 from ..data.tables import DONE, score_columns

@@ -17,7 +17,7 @@ from typing import Any, Final
 import pandas as pd
 
 from ...core.errors import UserError
-from ...study import provenance
+from ...study.running import provenance
 from ..compare.runs import records_of
 from ..data.categories import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE
 from ..data.layout import Layout, network_of

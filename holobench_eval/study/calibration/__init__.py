@@ -73,10 +73,8 @@ def load_calibration(profile: Profile) -> Calibration:
     for entry in fields(Panel):
         own, wanted = (getattr(panel, entry.name) for panel in (profile.panel, shipped.panel))
         if own != wanted:
-            raise UserError(
-                f"profile '{profile.name}': panel.{entry.name} is {own}, and the figures that calibrate fits are of "
-                f"'{name}', where it is {wanted}; {_right()}"
-            )
+            published = f"the figures that calibrate fits are of '{name}', where it is {wanted}"
+            raise UserError(f"profile '{profile.name}': panel.{entry.name} is {own}, and {published}; {_right()}")
     return typed(load(FOLDER / f"{name}.yaml"), Calibration)
 
 

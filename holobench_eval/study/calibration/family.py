@@ -7,7 +7,6 @@ Approximate Bayesian computation by rejection (Pritchard et al. 1999, Mol. Biol.
 from __future__ import annotations
 
 import csv
-import fcntl
 import hashlib
 import json
 import math
@@ -24,7 +23,7 @@ from torch import Tensor
 
 from ...core import plugins
 from ...core.errors import CellError, UserError, suggest
-from ...core.io import write_atomically
+from ...core.io import locked, write_atomically
 from ...core.schema import typed
 from ...core.seeds import generator, seed
 from ...core.yaml_source import load
@@ -168,9 +167,7 @@ def compute(name: str, folder: Path, executor: Executor, draws: int, tell: Calla
     """
     family, path = load_family(name), folder / "draws.csv"
     columns, work = columns_of(family), partial(_evaluated, name, folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # another run here waits, and then has the rows
+    with locked(folder / ".lock"):  # another run here waits, and then has the rows
         _refuse_others(name, family, folder)
         for number in range(len(family.geometries)):
             _solve(family, number, folder)

@@ -28,8 +28,8 @@ from ..config import load_study
 from ..executors import Serial
 from ..opening import open_bench
 from ..plan import plan
-from ..progress import Lines
-from ..run import run
+from ..running.progress import Lines
+from ..running.run import run
 from . import Calibration, hologram, nested, with_values
 
 Values = Mapping[str, float]

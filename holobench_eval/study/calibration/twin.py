@@ -190,10 +190,8 @@ class Photographed:
         assert wanted is not None
         artifacts = Artifacts(self.artifacts)
         if not artifacts.has(wanted):
-            reason = artifacts.failure(wanted)
-            raise UserError(
-                f"{artifacts.folder}: has no trained {self.label}: {reason}; give its --artifacts or --retrain"
-            )
+            lacks = f"has no trained {self.label}: {artifacts.failure(wanted)}"
+            raise UserError(f"{artifacts.folder}: {lacks}; give its --artifacts or --retrain")
         return artifacts.load(wanted)
 
 

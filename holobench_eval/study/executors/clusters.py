@@ -167,9 +167,8 @@ def _answering() -> Iterator[None]:
     try:
         yield
     except (CancelledError, ClosedClientError, OSError) as error:
-        raise UserError(
-            "the Dask scheduler went away; what is finished is kept, and the same command computes the rest"
-        ) from error
+        kept = "what is finished is kept, and the same command computes the rest"
+        raise UserError(f"the Dask scheduler went away; {kept}") from error
 
 
 def _exports() -> list[str]:

@@ -19,7 +19,7 @@ J = TypeVar("J")  # a job
 R = TypeVar("R")  # its result
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 # By the process that others are forked from; torch's optimisers import the last at their first use, in over a second.
-PRELOADED = ["holobench_eval.study.executors.imported", "holobench_eval.study.run", "torch._dynamo"]
+PRELOADED = ["holobench_eval.study.executors.imported", "holobench_eval.study.running.run", "torch._dynamo"]
 # Not on Windows, nor where libraries of the system do not bear a fork: every process imports on its own there.
 FORKS = "forkserver" in get_all_start_methods() and sys.platform != "darwin"
 CONTEXT = get_context("forkserver") if FORKS else get_context("spawn")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,13 +52,12 @@ def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark
     the folder, a capture without a target of its name.
     """
     target_paths = {path.stem: path for path in _pictures(targets, targets, "a target of each scene, <target>.png")}
-    capture_paths = {
-        (folder.name, path.stem): path
-        for folder in _methods(captures)
-        for path in _pictures(
-            folder, captures, f"a capture of each target, <target>.png{_deeper(folder)}", CAPTURE_SUFFIXES
-        )
-    }
+    capture_paths = dict[Key, Path]()
+    for folder in _methods(captures):
+        expected = f"a capture of each target, <target>.png{_deeper(folder)}"
+        capture_paths |= {
+            (folder.name, path.stem): path for path in _pictures(folder, captures, expected, CAPTURE_SUFFIXES)
+        }
     for (_, name), path in capture_paths.items():
         if name not in target_paths:
             twice = _twice(path, target_paths.values())
@@ -164,22 +164,22 @@ def named(names: list[str]) -> str:
 
 def remedies(holes: Iterable[Hole]) -> str:
     """What to do about each kind of hole, in one sentence; empty where there is no hole."""
-    kinds: dict[str, list[tuple[str, str]]] = {}
+    kinds = defaultdict[str, list[tuple[str, str]]](list)
     for state, method, target, reason in holes:
-        kinds.setdefault(_kind(state, reason), []).append((method, target))
+        kinds[_kind(state, reason)].append((method, target))
     found = "; ".join(_by_kind(kinds))
     return f"{found[:1].upper()}{found[1:]}." if found else ""
 
 
-def _by_kind(kinds: dict[str, list[tuple[str, str]]]) -> Iterator[str]:
-    if at_target := list(dict.fromkeys(target for _, target in kinds.get("target", []))):
+def _by_kind(kinds: defaultdict[str, list[tuple[str, str]]]) -> Iterator[str]:
+    if at_target := list(dict.fromkeys(target for _, target in kinds["target"])):
         which = f"target{'s' * (len(at_target) > 1)} {named(at_target)}"
         yield f"save or choose the {which} anew, whose fault it is and not the captures', as the reasons say"
-    if in_file := [f"{method}/{target}" for method, target in kinds.get("file", [])]:
+    if in_file := [f"{method}/{target}" for method, target in kinds["file"]]:
         yield f"save {named(in_file)} anew, as the reasons say"
-    if kinds.get("photograph"):
+    if kinds["photograph"]:
         yield "take the failed captures again, or name them by what they show"
-    if kinds.get("missing"):
+    if kinds["missing"]:
         yield "add the captures that are missing"
 
 

@@ -27,8 +27,9 @@ from ...lab.photograph import MOST_SATURATED
 from ...metrics import catalogue, floor_captures, match, score
 from ...metrics.protocol import VERSION
 from ...optics.colour import srgb_decode, srgb_encode
-from .. import identity, provenance
+from .. import identity
 from ..plan import FLOORS, REFERENCE
+from ..running import provenance
 from ..scoring.pictures import write_thumbnail
 from ..store import Record, Scores, Store
 from ..versions import ALIGNMENT, HARNESS
@@ -54,13 +55,8 @@ def described(folders: Folders, values: str, dark: str = "") -> dict[str, Any]:
     files = {f"captures/{'/'.join(key)}": picture.sha256 for key, picture in folders.captures.items()}
     files |= {f"targets/{name}": picture.sha256 for name, picture in folders.targets.items()}
     code = {"metrics": HARNESS, "alignment": ALIGNMENT}
-    return {
-        "code_sha256": code,
-        "files": files,
-        "values": values,
-        **({"dark": dark} if dark else {}),
-        **provenance.software(),
-    }
+    given = {"code_sha256": code, "files": files, "values": values} | ({"dark": dark} if dark else {})
+    return given | provenance.software()
 
 
 @dataclass(frozen=True)

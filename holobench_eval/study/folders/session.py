@@ -28,8 +28,8 @@ from ..displays import condition, displays
 from ..executors import Serial
 from ..opening import forget_sessions, open_display
 from ..plan import plan
-from ..progress import Lines
-from ..run import Outcome, run
+from ..running.progress import Lines
+from ..running.run import Outcome, run
 from .files import named
 
 STUDY, BENCH, REPORT, ARTIFACTS = "study.yaml", "bench.yaml", "report", "artifacts"
@@ -282,10 +282,9 @@ def _advance(study: Study, folder: Path, watch: Lines) -> Advance:
     photographer = session_photographer(folder)
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, 1, folder / ARTIFACTS, retry_failed=True)
     if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
-        raise UserError(
-            f"{folder}: other holograms are computed here than were photographed, and {REPORT}/solved lacks those; "
-            "bring the whole folder of the session from where it was exported, or import it there"
-        )
+        fault = f"other holograms are computed here than were photographed, and {REPORT}/solved lacks those"
+        remedy = "bring the whole folder of the session from where it was exported, or import it there"
+        raise UserError(f"{folder}: {fault}; {remedy}")
     patterns = photographer.write_round() if photographer.wanted else []
     return Advance(study, tuple(patterns), outcome)
 

@@ -41,6 +41,7 @@ MOST_PROCESSES = 2**22  # of Linux, proc(5), pid_max
 ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it answers
 ERRORS = {cls.__name__: cls for cls in (UserError, CellError, BudgetError)}
 Handle = MeteredDisplay | TrainingBench
+Fork = tuple[dict[str, Any], Channel]  # a process for one call: what it gets ready with, and the way to it
 
 
 def _shown(text: str) -> str:
@@ -81,14 +82,6 @@ RESULTS: dict[str, TypeAdapter[Any]] = {  # of functions that a method has besid
     "files": TypeAdapter(list[Text]),
     "external": TypeAdapter(dict[Text, Text | None]),
 }
-
-
-@dataclass(frozen=True)
-class Fork:
-    """A process for one call. setting: what it gets ready with; channel: the way to it."""
-
-    setting: dict[str, Any]
-    channel: Channel
 
 
 class MethodProcess:
@@ -149,7 +142,7 @@ class MethodProcess:
         """Kill the process and all that it has started."""
         self.at_exit.cancel()  # it would keep this object, and its files open, until the harness ends
         if self._next is not None:
-            self._next.channel.connection.close()
+            self._next[1].connection.close()
         left = list[psutil.Process]()
         with suppress(psutil.Error):
             left = psutil.Process(self.process.pid).children(recursive=True)
@@ -209,14 +202,14 @@ class MethodProcess:
 
     def _forked(self, setting: dict[str, Any]) -> tuple[int, Channel]:
         """The number of a process that gets ready for a call, and the way to it. EOFError, OSError without one."""
-        fork, self._next = self._next or self._fork(setting), None
+        (prepared, channel), self._next = self._next or self._fork(setting), None
         if self._ends:
             self._told()
             self._ends = False
         pid = self._number(self._told())
-        if fork.setting == setting:
-            return pid, fork.channel
-        fork.channel.connection.close()
+        if prepared == setting:
+            return pid, channel
+        channel.connection.close()
         self._end_call()
         return self._forked(setting)
 
@@ -227,7 +220,7 @@ class MethodProcess:
             reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
         channel = Channel(ours)
         channel.send(setting)
-        return Fork(setting, channel)
+        return setting, channel
 
     def _end_call(self) -> None:
         self.control.send("end")

@@ -42,11 +42,9 @@ def of(entry: MethodEntry, folder: Path, cls: type[Any], targets: Iterable[str])
     read = [(target, path, sha256) for target, digests in found.items() for path, sha256 in digests.items()]
     if read and all(sha256 == ABSENT for *_, sha256 in read):
         target, path, _ = read[0]
-        which = "" if file_name(target) == target else f" for the target '{target}'"
+        path += "" if file_name(target) == target else f" for the target '{target}'"
         where = "" if Path(path).is_absolute() else ", from the working directory"
-        raise UserError(
-            f"method '{entry.name}': none of the files that it reads is there, such as {path}{which}{where}"
-        )
+        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {path}{where}")
     return {target: {**digests, **taken} for target, digests in found.items()}
 
 

@@ -38,13 +38,11 @@ def work(job: Job) -> list[Record]:
     """
     metrics = job.setting.metrics
     with repeatable(job.setting.threads, job.device):
-        kept = {cell.id for cell, _ in job.cells if cell.id in job.unscored and is_kept(cell, job.store, metrics)}
-        records = [
-            _recorded(job, cell, display, partial(picture.rescored, job))
-            for cell, display in job.cells
-            if cell.id in kept
-        ]
-        rest = [(cell, display) for cell, display in job.cells if cell.id not in kept]
+        kept, rest = list[tuple[Cell, Condition]](), list[tuple[Cell, Condition]]()
+        for cell, display in job.cells:
+            is_rescored = cell.id in job.unscored and is_kept(cell, job.store, metrics)
+            (kept if is_rescored else rest).append((cell, display))
+        records = [_recorded(job, *pair, partial(picture.rescored, job)) for pair in kept]
         records += _captured(job, rest) if rest else []
         return [record for record in records if record is not None]
 
@@ -58,7 +56,7 @@ def _captured(job: Job, cells: list[tuple[Cell, Condition]]) -> list[Record | No
         return []
     except (Exception, SystemExit) as error:
         return [_note_failure(job, cell, error) for cell, _ in cells]
-    return [_recorded(job, cell, display, partial(_added, job, measured)) for cell, display in cells]
+    return [_recorded(job, *pair, partial(_added, job, measured)) for pair in cells]
 
 
 def _added(job: Job, measured: Measured, cell: Cell, display: Condition) -> Record:
@@ -104,9 +102,7 @@ def _recorded(job: Job, cell: Cell, display: Condition, measured: Measured) -> R
 
 
 def _note_failure(job: Job, cell: Cell, error: BaseException) -> Record:
-    record = job.failed(cell, error)
+    record, text = job.failed(cell, error), "".join(traceback.format_exception(error))
     job.store.write(record)
-    write_atomically(
-        job.store.log(cell.id), "".join(traceback.format_exception(error)).encode("utf-8", "backslashreplace")
-    )
+    write_atomically(job.store.log(cell.id), text.encode("utf-8", "backslashreplace"))
     return record

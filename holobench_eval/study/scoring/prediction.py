@@ -104,10 +104,8 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
     """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
     seen = _foresee(job)
     wanted, factors = match(seen.capture.image, seen.target)
-    image = factors.view(-1, 1, 1) * seen.prediction
-    taken = seen.taken
-    cost.keep(job.timing, taken.seconds)
-    figures = more(seen)
+    image, figures = factors.view(-1, 1, 1) * seen.prediction, more(seen)
+    cost.keep(job.timing, seen.taken.seconds)
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.hologram.phase)
@@ -122,7 +120,7 @@ def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured
             learned=account(seen.learned),
             reads={**seen.hologram.covered, **seen.reads.covered},
             uncovered=tuple({*seen.hologram.uncovered, *seen.reads.uncovered}),
-            **asdict(taken),
+            **asdict(seen.taken),
         )
 
     return compare

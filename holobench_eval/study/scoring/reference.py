@@ -45,10 +45,9 @@ def guarded(method: str, isolation: Isolation, display: Condition, seed: int) ->
         before = _before[key]
         changed = sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
         if changed:
-            raise StopError(
-                f"method '{method}' has changed the harness: after it, the same phase on {display.name} has another "
-                f"{changed[0]}; no score after it can be trusted. Mend its file, and run the same command again"
-            )
+            found = f"after it, the same phase on {display.name} has another {changed[0]}"
+            remedy = "no score after it can be trusted. Mend its file, and run the same command again"
+            raise StopError(f"method '{method}' has changed the harness: {found}; {remedy}")
 
 
 def digits(display: Condition, seed: int) -> Digits:

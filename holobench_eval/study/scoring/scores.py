@@ -55,10 +55,8 @@ def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
     target = wanted.double()
     matched, _ = match(image.double(), target)
     luminance, structure = LocalStatistics(target).maps(matched)
-    values = (
-        psnr(matched[:, mask][:, None], target[:, mask][:, None]),
-        (luminance * structure)[:, inner].mean(),
-    )
+    ratio, similarity = psnr(matched[:, mask][:, None], target[:, mask][:, None]), luminance * structure
+    values = ratio, similarity[:, inner].mean()
     return {name: float(value) for name, value in zip(SCORES, values, strict=True)}
 
 

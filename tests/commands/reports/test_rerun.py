@@ -14,9 +14,9 @@ from holobench_eval.study import executors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
-from holobench_eval.study.run import Outcome
+from holobench_eval.study.running.run import Outcome
 from tests.commands.test_commands import holoeval
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support import trained_study
 from tests.support.fake_study import installed, solves, write_config
 

@@ -10,7 +10,7 @@ import pytest
 from holobench_eval.report import build_report, committed_records, difference, read_records
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.test_run import compute
+from tests.study.studies import compute
 from tests.support.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")

@@ -253,7 +253,7 @@ def test_the_name_in_the_file_counts(tmp_path: Path) -> None:
     assert len(versions) == 2
 
 
-def test_a_module_of_the_studys_folder_that_is_on_the_path_is_code_of_all_that_import_it(
+def test_a_module_of_the_studys_folder_is_code_of_all_that_import_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "lib").mkdir()

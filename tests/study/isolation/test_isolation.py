@@ -14,8 +14,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.process import process_of
-from tests.study.studies import MILD, TWO, write_study
-from tests.study.test_run import compute
+from tests.study.studies import MILD, TWO, compute, write_study
 from tests.support.patience import PATIENCE
 
 METHODS = '''
@@ -79,12 +78,8 @@ def digits(records: list[dict[str, Any]]) -> list[Any]:
 def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
     cls = isolation.find(f"{file}:Mine", Path())
     assert (cls.__name__, cls.__doc__) == ("Mine", "Flat phases.\n\nAnd more.")
-    assert (cls.camera, cls.tuned, hasattr(cls, "predict"), hasattr(cls, "trains")) == (
-        True,
-        "on nothing",
-        False,
-        False,
-    )
+    declared = cls.camera, cls.tuned, hasattr(cls, "predict"), hasattr(cls, "trains")
+    assert declared == (True, "on nothing", False, False)
     method = isolation.build(f"{file}:Mine", {}, Path())
     assert isolation.params_of(method) == {"level": 1.0}
     assert method.available() is None
@@ -302,9 +297,7 @@ def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch:
     assert counts[-1] == counts[3]
 
 
-def test_a_plain_script_runs_in_a_folder_with_files_named_like_modules_and_ends_though_a_file_is_deaf(
-    tmp_path: Path,
-) -> None:
+def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path: Path) -> None:
     (tmp_path / "work").mkdir()
     deaf = "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
     (tmp_path / "work/random.py").write_text(f"{deaf}def Mine(target, bench):\n    return target\n")

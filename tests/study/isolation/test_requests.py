@@ -23,9 +23,7 @@ def test_a_row_of_a_training_may_have_any_names(tmp_path: Path) -> None:
     assert sent == [{"ask": "log", "args": (), "named": {"name": 1, "step": 2}}]
 
 
-def test_only_what_a_method_may_declare_is_taken_from_its_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_a_method_may_declare_is_taken_from_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     flags = {"camera": True, "timed": False, "solve": "mine", "_call": None}
     facts = process.Facts("Mine", "", flags, ["solve"], "", None, 0.0, True)
     monkeypatch.setattr(process, "process_of", lambda *_: SimpleNamespace(facts=facts))

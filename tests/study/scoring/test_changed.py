@@ -27,9 +27,7 @@ def test_the_brighter_half_loses_its_light_and_the_other_none(bright: int) -> No
 
 
 @pytest.mark.parametrize(("level", "expected"), [(0.2, 1.0), (0.9, 0.0)])
-def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_where_it_was_bright(
-    level: float, expected: float
-) -> None:
+def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_if_it_was_bright(level: float, expected: float) -> None:
     target = torch.full((3, 60, 90), level)
     changed = changed_target(target, "patch", 3, "t") != target
     assert changed.sum() == 3 * 12**2

@@ -11,8 +11,7 @@ from holobench_eval.core import plugins
 from holobench_eval.core.errors import StopError
 from holobench_eval.metrics import protocol
 from holobench_eval.study.store import Store
-from tests.study.studies import MILD, write_study
-from tests.study.test_run import compute
+from tests.study.studies import MILD, compute, write_study
 
 METHODS = """
 from dataclasses import dataclass

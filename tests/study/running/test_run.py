@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from holobench_eval.commands.plan import preview
+from holobench_eval.core.errors import StorageError, UserError
+from holobench_eval.core.io import file_name
+from holobench_eval.core.pictures import open_picture
+from holobench_eval.report import Results, layout_of, records_frame
+from holobench_eval.study.config import load_study
+from holobench_eval.study.executors import Executor, Serial
+from holobench_eval.study.executors.clusters import Address
+from holobench_eval.study.executors.local import Local
+from holobench_eval.study.plan import plan
+from holobench_eval.study.running import provenance
+from holobench_eval.study.running.progress import Lines
+from holobench_eval.study.store import Store
+from tests.study.studies import TURNS, add_one_laser, compute
+from tests.support.fake_study import solves, untimed, write_config
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+
+def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path: Path) -> None:
+    config, output = write_config(tmp_path), tmp_path / "out"
+    first = compute(config, output)
+    assert {record["state"] for record in first.records} == {"done"}
+    assert (first.computed, first.failed, len(first.records)) == (3 * 6 + 3, 0, 3 * 6 + 3)
+    again = compute(config, output)
+    assert again.computed == 0
+    assert (again.records, again.provenance) == (first.records, first.provenance)
+    Store(output).path(plan(load_study(config)).tasks[-1].cells[0].id).unlink()
+    again = compute(config, output)
+    assert again.computed == 1
+    assert untimed(again.records) == untimed(first.records)
+    assert len(solves(tmp_path)) == 3  # the phase was kept
+    renamed, other = (
+        f'{{name: "plugins.py:Toy", label: {label}}}' for label in ("renamed", "other, params: {value: 2}")
+    )
+    again = compute(write_config(tmp_path, (renamed,)), output)
+    assert again.computed == 0
+    assert {record["label"] for record in again.records[-3:]} == {"renamed"}
+    more = compute(write_config(tmp_path, ("plugins.py:Toy", other)), output)
+    assert (more.computed, len(more.records)) == (3, 3 * 6 + 2 * 3)
+
+
+def test_an_exception_in_a_method_is_a_failed_cell_that_is_computed_again_only_when_asked(tmp_path: Path) -> None:
+    lines: list[str] = []
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no\\n light"}}',))
+    outcome = compute(config, tmp_path / "out", lines.append)
+    states = [(record["cell"]["target"], record["state"]) for record in outcome.records[-3:]]
+    assert states == [("gray 0", "done"), ("gray 1", "failed"), ("gray 2", "done")]
+    failed = outcome.records[-2]
+    assert outcome.failed == 1
+    assert re.fullmatch(r"ValueError: no light \(plugins\.py, line \d+\)", failed["reason"])
+    assert failed["scores"] == {}
+    store = Store(tmp_path / "out")
+    assert "Traceback" in store.log(plan(load_study(config)).cells[-2].id).read_text()
+    assert any("gray 1" in line and "no light" in line for line in lines)
+    assert compute(config, tmp_path / "out").computed == 0
+    again = compute(config, tmp_path / "out", retry_failed=True)
+    assert (again.computed, again.failed) == (1, 1)
+    assert len(solves(tmp_path)) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("Disguised", "what solve returned: a value is Target"),  # a tensor with a class of its own
+        ("Nameless", r"^ValueError: \\udcff\.png \(plugins\.py, "),  # no Unicode
+    ],
+)
+def test_what_is_no_phase_and_no_text_is_a_failed_cell_with_a_reason(tmp_path: Path, name: str, reason: str) -> None:
+    config = write_config(tmp_path, (f'{{name: "plugins.py:{name}"}}',), count=1)
+    record = compute(config, tmp_path / "out").records[-1]
+    assert record["state"] == "failed"
+    assert re.search(reason, record["reason"])
+    assert compute(config, tmp_path / "out").computed == 0
+
+
+@pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])
+def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: Executor) -> None:
+    config, output = write_config(tmp_path, count=1), tmp_path / "out"
+    compute(config, output)
+    cells = plan(load_study(config)).cells
+    store = Store(output)
+    store.remove(cell.id for cell in cells)
+    refused = store.thumbnail(cells[-1].id)
+    refused.unlink()
+    refused.mkdir()  # no file can have this name, as none can be written to a full disk
+    with pytest.raises(StorageError, match=rf"{refused.name} cannot be written: .*; mend that, and run the same"):
+        compute(config, output, executor=executor)
+    assert store.read(cells[-1].id) is None
+    refused.rmdir()
+    assert {record["state"] for record in compute(config, output, executor=executor).records} == {"done"}
+
+
+def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("holobench_eval.study.scoring.scores.score", lambda *_, **__: {"psnr_linear": float("nan")})
+    outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
+    assert {record["state"] for record in outcome.records} == {"failed"}
+    assert outcome.records[0]["reason"] == "the score psnr_linear is nan"
+
+
+def test_targets_keep_their_pictures_when_displays_change_places(tmp_path: Path) -> None:
+    add_one_laser(tmp_path)
+    for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
+        config = write_config(tmp_path, profiles=order, count=1)
+        layout = layout_of(load_study(config))
+        results = Results(records_frame(compute(config, tmp_path / "out").records, layout), layout)
+        shapes = [results.shape(results.reference(name)) for name in ("ideal", "one")]
+        paths = [Store(tmp_path / "out").target_thumbnail("gray 0", shape) for shape in shapes]
+        assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1], order
+
+
+def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: "a/b"}',), count=1)
+    config.write_text(config.read_text() + "save: {captures: true, phases: true}\n")
+    compute(config, tmp_path / "out")
+    written = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*/*/*.*"))
+    label, target = file_name("a/b"), file_name("gray 0")
+    assert written == [
+        f"captures/{label}/ideal/{target}.json",
+        f"captures/{label}/ideal/{target}.png",
+        f"phases/{label}/ideal/{target}.npy",
+        f"phases/{label}/ideal/{target}.png",
+    ]
+
+
+def test_a_folder_in_use_by_another_run_is_refused(tmp_path: Path) -> None:
+    config = write_config(tmp_path, count=1)
+    with Store(tmp_path / "out").locked(), pytest.raises(UserError, match="another run is using this folder"):
+        compute(config, tmp_path / "out")
+    assert compute(config, tmp_path / "out").computed == 5 + 1
+
+
+def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = write_config(tmp_path)
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Lines, "finished", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            compute(config, tmp_path / "out")
+    assert compute(config, tmp_path / "out").computed == 21 - 6
+    earlier = provenance.read(tmp_path / "out")["earlier"]
+    assert [run["ended"] for run in earlier] == [None]
+
+
+def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path: Path) -> None:
+    config = write_config(tmp_path)
+    shared = compute(config, tmp_path / "out", executor=TURNS)
+    assert [record["alone"] for record in shared.records[-3:]] == [False] * 3
+    config.write_text(f"{config.read_text()}timing: alone\n")
+    study = load_study(config)
+    foreseen = preview(study, plan(study), Store(tmp_path / "out"), threads=1, workers=2)
+    assert [(row.done, row.missing) for row in foreseen] == [(18, 0), (2, 1)]
+    alone = compute(config, tmp_path / "out", executor=TURNS)
+    assert alone.computed == 1
+    assert [record["alone"] for record in alone.records[-3:]] == [False, False, True]
+    assert compute(config, tmp_path / "out", executor=TURNS).computed == 0
+    single = compute(config, tmp_path / "single").records[-3:]
+    assert [record["alone"] for record in single] == [True] * 3
+
+
+def test_workers_that_may_come_time_nothing_alone_unless_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Address, "workers", 1)
+    monkeypatch.setattr(Address, "map", Serial.map)
+    records = compute(write_config(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
+    assert [record["alone"] for record in records[-3:]] == [False] * 3
+
+
+def test_seconds_are_those_of_the_study_that_reports_them(tmp_path: Path) -> None:
+    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.05}}',), count=1)
+    first = compute(config, tmp_path / "a").records[-1]["seconds"]
+    assert first >= 0.05
+    assert compute(config, tmp_path / "b").records[-1]["seconds"] != first
+    assert compute(config, tmp_path / "a").records[-1]["seconds"] == first
+
+
+NEEDY = '''
+
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Needy(Toy):
+    """Runs where a file says so."""
+
+    def available(self):
+        return None if Path(__file__).with_name("here").exists() else "no lens; buy one"
+'''
+
+
+def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_left_for_it(tmp_path: Path) -> None:
+    config, here = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
+    (tmp_path / "plugins.py").write_text((tmp_path / "plugins.py").read_text() + NEEDY)
+    with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
+        compute(config, tmp_path / "out")
+    assert solves(tmp_path) == []
+    here.touch()
+    compute(config, tmp_path / "out")
+    here.unlink()
+    compute(config, tmp_path / "out")
+    assert len(solves(tmp_path)) == 6
+
+
+@pytest.mark.parametrize("asked", ["protocol: {metrics: [psnr, lpips_alex]}", "headline: lpips_alex_srgb"])
+def test_a_metric_without_its_weights_is_refused_by_a_run_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+) -> None:
+    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
+    config = write_config(tmp_path)
+    config.write_text(f"{config.read_text()}\n{asked}\n")
+    assert plan(load_study(config)).metrics["lpips_alex"] == "v2, 0.1"  # as with the weights
+    with pytest.raises(UserError, match="metric 'lpips_alex' cannot be computed here: no trunk weights"):
+        compute(config, tmp_path / "out")
+    assert not solves(tmp_path)

@@ -1,0 +1,96 @@
+"""Holograms of several frames, from a method to the files of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from holobench_eval.report import layout_of, records_frame
+from holobench_eval.report.data import columns
+from holobench_eval.study.config import load_study
+from tests.study.studies import compute
+
+METHOD = """
+import torch
+
+def several(target, bench, frames: int = 1, wrong: bool = False):
+    shape = (len(target), frames, target.shape[1], *bench.spec.shape)
+    phase = 6 * torch.rand(shape, generator=bench.generator("frames"))
+    return phase[..., 1:] if wrong else phase
+"""
+CAMERA = """
+import torch
+from dataclasses import dataclass
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Looks:
+    camera: ClassVar[bool] = True
+
+    def solve(self, target, bench):
+        phase = torch.zeros(target.shape[1], *bench.spec.shape)
+        for _ in range(3):
+            bench.capture(phase)
+        return phase.expand(1, 4, *phase.shape)
+"""
+STUDY = """
+title: frames
+seed: 1
+display: {{profiles: [{display}], panel: [128, 128]}}
+targets: {{dataset: photographs, params: {{names: [camera]}}}}
+protocol: {{metrics: [psnr]}}
+save: {{phases: true}}
+methods: [{methods}]
+"""
+
+
+def records_of(tmp_path: Path, display: str, *methods: str) -> list[dict[str, Any]]:
+    (tmp_path / "mine.py").write_text(METHOD)
+    listed = ", ".join(f"{{name: 'mine.py:several', label: m{i}, {params}}}" for i, params in enumerate(methods))
+    (tmp_path / "study.yaml").write_text(STUDY.format(display=display, methods=listed))
+    records = compute(tmp_path / "study.yaml", tmp_path / "out").records
+    return [record for record in records if record["label"].startswith("m")]
+
+
+def test_frames_are_counted_kept_and_shown_together(tmp_path: Path) -> None:
+    one, four, nine, wrong = records = records_of(
+        tmp_path, "flc-1bit", "", "params: {frames: 4}", "params: {frames: 9}", "params: {frames: 2, wrong: true}"
+    )
+    assert [record["frames"] for record in (one, four)] == [1, 4]
+    assert "m2: phase has 9 frames, the display shows 8 at most in an exposure" in nine["reason"]
+    assert "m3: phase is (2, 3, 128, 127), the display shows (C, 128, 128)" in wrong["reason"]
+    frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    assert frame["frames"].tolist()[:2] == [1, 4]
+    assert frame["panel_time"].tolist()[:2] == [1, 4]
+    saved = tmp_path / "out" / "phases"
+    assert np.load(next((saved / "m0").rglob("*.npy"))).shape == (3, 128, 128)
+    assert np.load(next((saved / "m1").rglob("*.npy"))).shape == (4, 3, 128, 128)
+    assert len(list((saved / "m1").rglob("*-frame-*.png"))) == 4
+    assert four["scores"]["psnr_linear"] > one["scores"]["psnr_linear"] + 1  # speckle of four adds up to less
+
+
+def test_a_study_of_single_frames_has_no_column_of_them(tmp_path: Path) -> None:
+    (record,) = records = records_of(tmp_path, "ideal", "")
+    assert record["state"] == "done"
+    frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    assert not {"frames", "panel_time"} & set(frame)
+
+
+def test_panel_time_counts_the_frames_of_every_capture() -> None:
+    column = next(each for each in columns.FIGURES if each.name == "panel_time")
+    assert column.unit == "frames"
+    assert column.source is not None
+    records = [{"frames": 8, "captures": 0}, {"frames": 8, "captures": 50}, {"captures": 50}, {"frames": 8}]
+    records.append({"frames": 4, "captures": 5, "shown": 5})
+    assert [column.source(record, None) for record in records] == [8, 408, 51, None, 9]
+
+
+def test_a_method_may_photograph_one_frame_and_give_several(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(CAMERA)
+    (tmp_path / "study.yaml").write_text(STUDY.format(display="flc-1bit", methods="'mine.py:Looks'"))
+    record = next(
+        each for each in compute(tmp_path / "study.yaml", tmp_path / "out").records if each["label"] == "Looks"
+    )
+    assert (record["captures"], record["shown"], record["frames"]) == (3, 3, 4)
