@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -112,21 +112,9 @@ def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
     return texts(Results(of_study(read_records(records_csv), layout), layout))
 
 
-@dataclass(frozen=True)
-class _Printed(Report):
-    """A report whose figures go elsewhere."""
-
-    folder: Path = field(kw_only=True)
-
-    @property
-    def figures(self) -> Path:
-        return self.folder
-
-
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
-    """Draw the charts of a report for one of ``MEDIA`` into a folder; every file."""
-    parts = report.results, report.records, report.output, report.provenance, report.description
-    printed = _Printed(*parts, kept={}, folder=folder)  # none of the figures made of pictures
+    """Draw the charts of a report for one of ``MEDIA`` into a folder, none of those made of pictures; every file."""
+    printed = replace(report, kept={}, drawn=folder)
     with drawn_for(MEDIA[medium]):
         for section in sections():
             if section.applies(printed):

@@ -8,7 +8,7 @@ nor break a table.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 from markupsafe import Markup
@@ -87,6 +87,11 @@ def table(headers: Sequence[object], rows: Sequence[Sequence[object]]) -> Markdo
     numeric = [all(_NUMERIC.fullmatch(str(cell)) for cell in cells) for _, *cells in columns]
     rule = "|".join(["", *(" ---: " if right else " --- " for right in numeric), ""])
     return Markdown("\n").join([_line(headers), Markdown(rule), *map(_line, rows)])
+
+
+def table_of(rows: Sequence[Mapping[str, object]]) -> Markdown | None:
+    """A pipe table of rows that name their cells, all alike; None without rows."""
+    return table(list(rows[0]), [list(row.values()) for row in rows]) if rows else None
 
 
 def properties(rows: Iterable[tuple[object, object]]) -> Markdown:

@@ -16,11 +16,10 @@ from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .data.statistics import Estimate
 from .data.twin import Trial
-from .markdown import Markdown, blocks, bullets, code, heading, table
+from .markdown import Markdown, blocks, bullets, code, heading, table_of
 from .sections.diagnosis import quantities
 
 COLOURS = ("red", "green", "blue")
-COLUMNS = ("display", "twin", "twin less display", "against a photograph", "further")
 PICTURES, SCORES = "pictures.jpg", "scores.png"
 
 
@@ -81,43 +80,50 @@ def _signed(estimate: Estimate) -> str:
     return f"{estimate.mean:+.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
-def _methods(found: Trial) -> Markdown:
-    colours = next(iter(found.twin.values())).gaps.shape[1] - 1
-    names = COLOURS if colours == len(COLOURS) else COLOURS[:0]
-    head = ["method", *(f"{name} [dB]" for name in COLUMNS), *names]
-    order = sorted(found.display, key=lambda label: -float(found.display[label].mean()))
+def _methods(found: Trial) -> Markdown | None:
     lines = []
-    for label in order:
-        shown, scores = found.twin[label], found.display[label]
-        gaps = shown.gaps.mean(0)[: 1 + len(names)]
-        named = f"{label} (flattery)" if label == found.label else label
-        means = [f"{values.mean():.2f}" for values in (scores, shown.scores)]
-        likeness = f"{shown.likeness[:, 0].mean():.1f}"
-        lines.append([named, *means, _signed(found.difference(label)), likeness, *(f"{gap:.2f}" for gap in gaps)])
-    return table(head, lines)
+    for label, scores in sorted(found.display.items(), key=lambda item: -float(item[1].mean())):
+        shown = found.twin[label]
+        gap, *of_colours = (f"{gap:.2f}" for gap in shown.gaps.mean(0))
+        line = {
+            "method": f"{label} (flattery)" if label == found.label else label,
+            "display [dB]": f"{scores.mean():.2f}",
+            "twin [dB]": f"{shown.scores.mean():.2f}",
+            "twin less display [dB]": _signed(found.difference(label)),
+            "against a photograph [dB]": f"{shown.likeness[:, 0].mean():.1f}",
+            "further [dB]": gap,
+        }
+        lines.append(line | (dict(zip(COLOURS, of_colours, strict=True)) if len(of_colours) == len(COLOURS) else {}))
+    return table_of(lines)
 
 
-def _pairs(found: Trial) -> Markdown:
-    lines = [
-        [f"{pair.first} less {pair.second}", _signed(pair.display), _signed(pair.twin), f"{pair.apart:.2f}"]
-        for pair in sorted(found.pairs(), key=lambda pair: -pair.apart)
-    ]
-    return table(["methods", "display [dB]", "twin [dB]", "apart [dB]"], lines)
-
-
-def _others(found: Trial) -> Iterable[Markdown | str]:
-    yield heading("Beside twins that know less")
-    head = ["display", "further, mean [dB]", "Kendall's tau", "two without a camera, off by [dB]"]
-    lines = [
+def _pairs(found: Trial) -> Markdown | None:
+    return table_of(
         [
-            name,
-            f"{np.mean([each.gaps[:, 0].mean() for each in shown.values()]):.1f}",
-            f"{found.tau(name):.2f}",
-            f"{found.worst(name).apart:.1f}",
+            {
+                "methods": f"{pair.first} less {pair.second}",
+                "display [dB]": _signed(pair.display),
+                "twin [dB]": _signed(pair.twin),
+                "apart [dB]": f"{pair.apart:.2f}",
+            }
+            for pair in sorted(found.pairs(), key=lambda pair: -pair.apart)
         ]
-        for name, shown in found.twins.items()
-    ]
-    yield table(head, lines)
+    )
+
+
+def _others(found: Trial) -> Iterable[Markdown | str | None]:
+    yield heading("Beside twins that know less")
+    yield table_of(
+        [
+            {
+                "display": name,
+                "further, mean [dB]": f"{np.mean([each.gaps[:, 0].mean() for each in shown.values()]):.1f}",
+                "Kendall's tau": f"{found.tau(name):.2f}",
+                "two without a camera, off by [dB]": f"{found.worst(name).apart:.1f}",
+            }
+            for name, shown in found.twins.items()
+        ]
+    )
     yield (
         f"Only what the first row has and the others lack is knowledge of {found.of}: a column in which the second is "
         "as good tells nothing."

@@ -42,7 +42,7 @@ def compare(
     from ...core.io import write_atomically
     from ...report.compare import page
     from ...report.compare.paired import compare as pair
-    from ...report.compare.runs import read_run
+    from ...report.compare.paired import read_run
 
     console = open_console()
     comparison = pair(read_run(a), read_run(b), metric, _pairs(displays))

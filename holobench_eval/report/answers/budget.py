@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.categories import OFFLINE, ONLINE
+from ..data.layout import OFFLINE, ONLINE
 from ..data.phrases import tested, value, verdict
 from ..data.results import Results
 from ..data.text import number, words

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ...core.errors import listed
 from ...study.folders.files import remedies
 from ..data.board import Display, Row, board
-from ..data.categories import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..data.layout import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
 from ..data.phrases import difference, verdict
 from ..data.results import Results
 from ..data.text import FILES, number, words
@@ -87,9 +87,7 @@ def published(results: Results, label: str, condition: str) -> str:
 
 
 KIND = Kind(
-    question="Which method gives the better picture, and by how much?",
-    applies=lambda results: True,
-    verdicts=verdicts,
+    question="Which method gives the better picture, and by how much?", applies=lambda results: True, verdicts=verdicts
 )
 
 # Paper Table 2: how well does a method exploit the network that stands for the display?

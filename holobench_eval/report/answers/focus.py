@@ -8,7 +8,7 @@ from ..data.board import Board
 from ..data.phrases import difference, marked, tested, value, verdict
 from ..data.results import Results
 from ..data.text import number
-from ..markdown import Markdown, table
+from ..markdown import Markdown, table_of
 from .kind import Kind, subjects
 
 
@@ -52,21 +52,20 @@ def rows(board: Board) -> Markdown | None:
     """A row a method and display: score over all planes or views, difference to the baseline, seconds a scene."""
     results = board.results
     score, baseline = results.headline, results.layout.baseline
-    lines = [
+    return table_of(
         [
-            marked(results, label, condition),
-            condition,
-            made_of(results, label),
-            score.in_row(results.row(label, condition)),
-            *([_against(results, label, condition)] if baseline else []),
-            number(seconds(results, label, condition)),
+            {
+                "method": marked(results, label, condition),
+                "display": condition,
+                "hologram of": made_of(results, label),
+                score.heading: score.in_row(results.row(label, condition)),
+                **({f"difference to {baseline}": _against(results, label, condition)} if baseline else {}),
+                "seconds a scene": number(seconds(results, label, condition)),
+            }
+            for condition in results.conditions
+            for label in results.methods(condition)
         ]
-        for condition in results.conditions
-        for label in results.methods(condition)
-    ]
-    against = [f"difference to {baseline}"] if baseline else []
-    headings = ["method", "display", "hologram of", score.heading, *against, "seconds a scene"]
-    return table(headings, lines) if lines else None
+    )
 
 
 KIND = Kind(

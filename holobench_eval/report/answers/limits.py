@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..data.categories import FLOOR
+from ..data.layout import FLOOR
 from ..data.phrases import remarks, too_few, uncovered
 from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, words

@@ -84,10 +84,9 @@ def _gains(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> 
     for part, height in zip(links, heights, strict=True):
         if part.gain is None:
             continue
-        low, high = np.nan_to_num([part.gain.mean - part.gain.low, part.gain.high - part.gain.mean])
         colour = colours[part.label]
-        axes.errorbar(part.gain.mean, height, xerr=[[low], [high]], fmt="o", color=colour, markersize=5, capsize=2)
-        end = part.gain.mean + high
+        axes.errorbar(part.gain.mean, height, xerr=part.gain.reach, fmt="o", color=colour, markersize=5, capsize=2)
+        end = part.gain.mean + part.gain.reach[1, 0]
         axes.annotate(
             f"{part.gain.mean:z.1f}",
             (end, height),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...study.calibration.family import Range, Row
-from ..data.display_map import Map
+from ..data.over_displays import Map
 from .look.medium import medium
 from .look.methods import Look
 from .style import PALE, grid, laid_out, legend_below, new_figure, save, style

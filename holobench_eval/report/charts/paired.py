@@ -47,8 +47,8 @@ def draw(results: Results, condition: str, path: Path) -> None:
     """
     baseline, score = results.layout.baseline, results.headline
     assert baseline is not None
-    above = results.above_floor(baseline, condition)
-    lines = {} if above is None else {"floor: a constant image": -above.mean}
+    floor, own = results.floor(condition), results.values(baseline, condition)
+    lines = {} if floor is None else {"floor: a constant image": floor - float(np.nanmean(own))}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
 
@@ -120,9 +120,10 @@ def _dots(axes: Axes, rows: Sequence[Row], names: Sequence[str], score: Score) -
         offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
         size = DOT if len(row.values) > FEW else 2 * DOT
         axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
-        mean, low, high = row.estimate.mean, row.estimate.low, row.estimate.high
-        reach = np.nan_to_num([[mean - low], [high - mean]])
-        axes.errorbar(mean, height, xerr=reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4)
+        mean = row.estimate.mean
+        axes.errorbar(
+            mean, height, xerr=row.estimate.reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4
+        )
         axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
         axes.annotate(
             score.estimate(row.estimate, signed=True),

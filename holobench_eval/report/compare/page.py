@@ -13,8 +13,7 @@ from ..data.tables import csv_text
 from ..data.text import words
 from ..markdown import Markdown, blocks, heading
 from ..markdown import table as markdown_table
-from .paired import EQUAL, Comparison, Row
-from .runs import provenance_differences
+from .paired import EQUAL, Comparison, Row, provenance_differences
 
 TARGETS = 10  # that changed most, in the list
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ...core.errors import UserError, suggest
 from ...metrics import control
 from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
-from .categories import FLOOR, OFFLINE, ORACLE
-from .layout import Layout
+from .layout import FLOOR, OFFLINE, ORACLE, Layout
 from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, family_p, mean_interval
 from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
@@ -230,9 +229,8 @@ class Results:
             for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
-    def above_floor(self, label: str, condition: str) -> Estimate | None:
-        """Headline score minus that of a constant image, target by target; None without one, or without a target."""
+    def floor(self, condition: str) -> float | None:
+        """The mean of a constant image under ``condition``; None where none was scored against its pictures."""
         if CONSTANT not in self.floors or not self.has_pictures(condition):
             return None
-        found = self.estimate(self.values(label, condition) - self.values(CONSTANT, self.reference(condition)))
-        return found if found.n else None
+        return float(self.values(CONSTANT, self.reference(condition)).mean())

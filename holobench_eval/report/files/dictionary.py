@@ -7,13 +7,12 @@ from typing import Literal
 
 import pandas as pd
 
-from ..data.column import Column
-from ..data.columns import recorded, tabled
-from ..data.comparisons import of_tests
+from ..data.columns import Column, recorded, tabled
 from ..data.scores import DOMAIN_NAMES, METRICS, Score, parse
 from ..data.statistics import LEVEL
 from ..data.tables import PUBLISHED
 from ..markdown import Markdown, blocks, code, heading, table
+from .tests_csv import of_tests
 
 File = Literal["records.csv", "table.csv", "tests.csv"]
 

@@ -74,7 +74,7 @@ def page(report: Report) -> str:
         data=data,
         json=Markup(json_text(data)),
         scripts=map(Markup, scripts),
-        contents=(base64.b64encode(content).decode() for content in held.contents),
+        contents=(base64.b64encode(content).decode() for content in held.values()),
     )
 
 

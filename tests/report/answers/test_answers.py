@@ -18,8 +18,7 @@ from holobench_eval.report.answers import ranks as ranks_kind
 from holobench_eval.report.answers import sweeps as sweeps_kind
 from holobench_eval.report.answers.kind import MOST_WORDS, Kind, subjects
 from holobench_eval.report.data.board import board
-from holobench_eval.report.data.categories import CALIBRATED, OPEN_LOOP
-from holobench_eval.report.data.layout import Swept
+from holobench_eval.report.data.layout import CALIBRATED, OPEN_LOOP, Swept
 from holobench_eval.study.definition import Claim
 from holobench_eval.study.plan import REFERENCE, is_reference, reference_of
 from tests.report.data import test_error_budget as budget_of_errors

@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report.compare.paired import Comparison, Unpaired, compare
-from holobench_eval.report.compare.runs import read_run
+from holobench_eval.report.compare.paired import Comparison, Unpaired, compare, read_run
 from holobench_eval.report.data.statistics import mean_interval
 from holobench_eval.report.data.tables import csv_text
 from tests.support.records_on_disk import Scores, write_report

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report.compare.runs import provenance_differences, read_run
+from holobench_eval.report.compare.paired import provenance_differences, read_run
 from tests.support.records_on_disk import write_report
 
 SCORES = {("toy", "bench"): [20.0, 21.0, 22.0]}

@@ -16,7 +16,7 @@ from holobench_eval.report.build import related
 from holobench_eval.report.charts.family import draw_map
 from holobench_eval.report.charts.look.methods import looks
 from holobench_eval.report.data.board import board
-from holobench_eval.report.data.display_map import display_map, judged, left_out
+from holobench_eval.report.data.over_displays import display_map, judged, left_out
 from holobench_eval.report.files import write_files
 from tests.report.answers.test_answers import NOISE, TARGETS
 from tests.report.data.test_over_displays import DISPLAYS, study

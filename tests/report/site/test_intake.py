@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report.site import checks, pictures, write_site
+from holobench_eval.report.site import intake, pictures, write_site
 from holobench_eval.report.site.intake import read
 from tests.support.results_folder import edited, write_results
 
@@ -225,7 +225,7 @@ def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) 
 def test_a_folder_of_too_many_rows_or_labels_is_refused(
     handed_in: Path, monkeypatch: pytest.MonkeyPatch, limit: str, words: str
 ) -> None:
-    monkeypatch.setattr(checks, limit, 5)
+    monkeypatch.setattr(intake, limit, 5)
     refused(handed_in, words, "at most 5")
 
 
