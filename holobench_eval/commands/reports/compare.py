@@ -79,7 +79,7 @@ def _pairs(displays: Sequence[str] | None) -> dict[str, str] | None:
 def _print(console: Console, part: Part) -> None:
     console.print(f"\n{part.title}. {part.sentence}", markup=False, highlight=False, soft_wrap=True)
     if part.rows:
-        table = Table(*map(escape, part.headings))
+        table = Table(*map(escape, part.rows[0]))
         for row in part.rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*map(escape, row.values()))
         console.print(table)

@@ -43,29 +43,19 @@ def seconds(results: Results, label: str, condition: str) -> float:
     return holograms * float(results.row(label, condition)["solving_s"])
 
 
-def _against(results: Results, label: str, condition: str) -> str:
-    test = tested(results, label, condition)
-    return results.headline.estimate(test.estimate, signed=True) if test else "–"
-
-
 def rows(board: Board) -> Markdown | None:
     """A row a method and display: score over all planes or views, difference to the baseline, seconds a scene."""
     results = board.results
     score, baseline = results.headline, results.layout.baseline
-    return table_of(
-        [
-            {
-                "method": marked(results, label, condition),
-                "display": condition,
-                "hologram of": made_of(results, label),
-                score.heading: score.in_row(results.row(label, condition)),
-                **({f"difference to {baseline}": _against(results, label, condition)} if baseline else {}),
-                "seconds a scene": number(seconds(results, label, condition)),
-            }
-            for condition in results.conditions
-            for label in results.methods(condition)
-        ]
-    )
+    lines = []
+    for label, condition in ((label, name) for name in results.conditions for label in results.methods(name)):
+        line = {"method": marked(results, label, condition), "display": condition}
+        line |= {"hologram of": made_of(results, label), score.heading: score.in_row(results.row(label, condition))}
+        if baseline:
+            test = tested(results, label, condition)
+            line[f"difference to {baseline}"] = score.estimate(test and test.estimate, signed=True)
+        lines.append(line | {"seconds a scene": number(seconds(results, label, condition))})
+    return table_of(lines)
 
 
 KIND = Kind(

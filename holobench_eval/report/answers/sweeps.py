@@ -148,8 +148,7 @@ def rows(board: Board) -> Markdown | None:
             line |= {f"mean loss there{score.brackets}": score.estimate(loss, signed=True)}
             if baseline:
                 gained = sweep.gain(label, dict(sweep.swept.points)[value]) if label != baseline else None
-                above = score.estimate(gained, signed=True) if gained else "–"
-                line |= {f"above {baseline} there{score.brackets}": above}
+                line |= {f"above {baseline} there{score.brackets}": score.estimate(gained, signed=True)}
             lines.append(line)
     return table_of(lines)
 

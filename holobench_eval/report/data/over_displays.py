@@ -77,7 +77,9 @@ def margins(results: Results) -> list[Margin]:
         better, worse = (
             sum(test.is_shown and side * sign * test.estimate.mean > 0 for test in tests) for side in (1, -1)
         )
-        found.append(Margin(label, differences.mean(1), _over_both(differences @ shares), better, worse))
+        by_cluster = differences @ shares
+        over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
+        found.append(Margin(label, differences.mean(1), over_both, better, worse))
     return sorted(found, key=lambda one: -sign * one.over_both.mean)
 
 
@@ -111,11 +113,6 @@ def parameters(results: Results) -> dict[str, Array]:
         for given in (*loaded.parameters, *loaded.outside.parameters)
     }
     return {words: column for words, column in values.items() if np.ptp(column) > 0}
-
-
-def _over_both(differences: Array) -> Estimate:
-    """Of ``(displays, clusters)``."""
-    return Estimate(*two_way(differences), *differences.shape)
 
 
 @dataclass(frozen=True)

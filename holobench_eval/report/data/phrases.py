@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.errors import one_line
 from ...study.folders.files import named
-from .columns import DONE
+from .column import DONE
 from .results import Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest

@@ -21,8 +21,8 @@ from ...core.errors import UserError
 from ...core.files import CONTROLS, read_text
 from ...study.plan import FLOORS, Plan, is_reference
 from . import columns
-from .columns import DONE as DONE
-from .columns import Cells, Column, Record
+from .column import DONE as DONE
+from .column import Cells, Column, Record
 from .layout import FLOOR, ORACLE, Layout
 from .scores import order_scores, parse
 from .statistics import mean_interval

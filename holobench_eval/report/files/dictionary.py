@@ -7,7 +7,8 @@ from typing import Literal
 
 import pandas as pd
 
-from ..data.columns import Column, recorded, tabled
+from ..data.column import Column
+from ..data.columns import recorded, tabled
 from ..data.scores import DOMAIN_NAMES, METRICS, Score, parse
 from ..data.statistics import LEVEL
 from ..data.tables import PUBLISHED

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pandas as pd
 
-from ..data.columns import Column, tabled
+from ..data.column import Column
+from ..data.columns import tabled
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import POWER, PairedTest

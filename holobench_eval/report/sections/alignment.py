@@ -153,15 +153,11 @@ def _pose(geometry: Mapping[str, Any]) -> dict[str, str]:
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Pictures of the captures that are least like their targets; they were drawn when these were scored."""
-    found = {
-        (record["label"], record["cell"]["target"]): record["cell"]["geometry"].get("correlation", np.nan)
-        for record in _captures(report.records)
-    }
-    done = report.results.frame[report.results.frame["state"] == DONE]
+    done = [(each["label"], each["cell"]) for each in _captures(report.records) if each["state"] == DONE]
     drawn = [
-        (found[method, target], path, method, target)
-        for method, target in zip(done["label"], done["target"], strict=True)
-        if (path := report.figures / alignment_name(method, target)).is_file()
+        (cell["geometry"].get("correlation", np.nan), path, label, cell["target"])
+        for label, cell in done
+        if (path := report.figures / alignment_name(label, cell["target"])).is_file()
     ]
     drawn.sort(key=lambda one: one[0])
     more = (

@@ -49,9 +49,8 @@ def _on_displays(report: Report) -> list[tuple[str, str]]:
     layout, cells = report.layout, [record["cell"] for record in report.records]
     sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
     panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
-    predicted = [("measured", f"predictions of the captures of holograms by {layout.holograms}")]
     return [
-        *(predicted if layout.predicts else []),
+        *([("measured", f"predictions of the captures of holograms by {layout.holograms}")] * layout.predicts),
         _targets(report.results),
         ("dataset", "; ".join(sets)),
         *([("training images", _training_images(layout.training))] if layout.training else []),

@@ -12,7 +12,7 @@ import pytest
 from holobench_eval.metrics.catalogue import catalogue
 from holobench_eval.report import Description, Layout, write_report
 from holobench_eval.report.data import columns
-from holobench_eval.report.data.columns import Cells, Column, Record, column, if_known, mean
+from holobench_eval.report.data.column import Cells, Column, Record, column, if_known, mean
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
 from holobench_eval.report.files.dictionary import File

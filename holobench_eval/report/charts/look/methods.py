@@ -85,7 +85,8 @@ def look(name: str, variant: int = 0, variants: int = 1) -> Look:
 
     variant, variants: which of how many rows of the method it is; later ones have paler faces.
     """
-    colour, marker = REGISTRY.get(name) or (NEUTRAL, _marker(name.rpartition(":")[2]))
+    chance = hashlib.sha256(name.rpartition(":")[2].encode()).digest()[0]  # depends on the name alone
+    colour, marker = REGISTRY.get(name, (NEUTRAL, MARKERS[chance % len(MARKERS)]))
     if name == "oracle":
         return Look(colour, marker, WHITE)
     pale = PALEST * variant / (variants - 1) if variants > 1 else 0.0
@@ -96,11 +97,6 @@ def _paler(colour: str, white: float) -> str:
     """A colour mixed with a share of white."""
     red, green, blue = (share + white * (1 - share) for share in to_rgb(colour))
     return to_hex((red, green, blue)).upper()
-
-
-def _marker(name: str) -> str:
-    """A marker that depends on the name alone."""
-    return MARKERS[hashlib.sha256(name.encode()).digest()[0] % len(MARKERS)]
 
 
 def looks(names: Mapping[str, str]) -> dict[str, Look]:
