@@ -17,7 +17,7 @@ from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
-from .markdown import FIGURE, Markdown, blocks
+from .markdown import DETAILS, REPORT, Markdown, blocks, captions
 from .page import write_page
 from .page.pictures import keep_copies
 from .section import Report
@@ -27,7 +27,6 @@ from .sections import sections
 OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
-REPORT, DETAILS = "report.md", "details.md"
 
 
 def build_report(
@@ -74,10 +73,9 @@ def write_report(
 
 def _kept(output: Path) -> dict[str, Markdown]:
     """The captions of the figures made of pictures that an earlier report left, by file name."""
-    texts = [path.read_text(encoding="utf-8") for name in (REPORT, DETAILS) if (path := output / name).is_file()]
     return {
         name: Markdown(caption)
-        for name, caption in FIGURE.findall("\n".join(texts))
+        for name, caption in captions(output).items()
         if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
     }
 

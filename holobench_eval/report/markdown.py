@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Self
 
 from markupsafe import Markup
 
+TEXTS = REPORT, DETAILS = "report.md", "details.md"
 # (file, caption) of a figure in a report
 FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
@@ -34,6 +36,12 @@ class Markdown(Markup):
             return cls(s)
         text = " ".join(str(s).split())
         return cls(_SPECIAL.sub(r"\\\g<0>", _TAG.sub("&lt;", _ENTITY.sub("&amp;", text))))
+
+
+def captions(folder: Path) -> dict[str, str]:
+    """The captions of the figures in the texts of a report, which are Markdown, by file name."""
+    texts = [path.read_text(encoding="utf-8") for name in TEXTS if (path := folder / name).is_file()]
+    return dict(FIGURE.findall("\n".join(texts)))
 
 
 def escape(value: object) -> Markdown:

@@ -304,7 +304,7 @@ def _others(found: Trial) -> Iterable[Markdown | str | None]:
     )
 
 
-def _parameters(photographed: Photographed, in_halves: bool) -> Iterable[Markdown | str]:
+def _parameters(photographed: Photographed, in_halves: bool) -> Iterable[Markdown | str | None]:
     rows = photographed.learned.provenance.get("estimates") or []
     if not rows:
         return

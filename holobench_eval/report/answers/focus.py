@@ -53,7 +53,7 @@ def rows(board: Board) -> Markdown | None:
         line |= {"hologram of": made_of(results, label), score.heading: score.in_row(results.row(label, condition))}
         if baseline:
             test = tested(results, label, condition)
-            line[f"difference to {baseline}"] = score.estimate(test and test.estimate, signed=True)
+            line[f"difference to {baseline}"] = score.estimate(test.estimate if test else None, signed=True)
         lines.append(line | {"seconds a scene": number(seconds(results, label, condition))})
     return table_of(lines)
 

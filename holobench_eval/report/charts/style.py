@@ -90,7 +90,7 @@ def marks(look: Look, size: float) -> dict[str, Any]:
 
 def note(axes: Axes, text: str, place: tuple[float, float], **more: Any) -> None:
     """Small words to the right of a place; more: as of ``Axes.annotate``."""
-    given = {"xytext": (5, 0), "textcoords": "offset points", "va": "center", "fontsize": medium().note}
+    given: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points", "va": "center", "fontsize": medium().note}
     axes.annotate(text, place, **(given | more))
 
 

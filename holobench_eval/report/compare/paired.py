@@ -271,7 +271,7 @@ def _rows(both: pd.DataFrame, score: Score, clusters: Mapping[str, str]) -> list
     keys = ["label", f"{OWN}{A}", f"{OWN}{B}"]
     means = both.groupby([*keys, "target"], sort=False)[[f"value{A}", f"value{B}"]].mean()
     differences = (means[f"value{B}"] - means[f"value{A}"]).unstack("target", sort=False)
-    adjusted = family_p(differences.to_numpy(), [clusters[target] for target in differences])
+    adjusted = family_p(differences.to_numpy(), [clusters[str(target)] for target in differences])
     found = []
     for ((method, of_a, of_b), group), p in zip(means.groupby(level=keys, sort=False), adjusted, strict=True):
         targets = tuple(map(str, group.index.get_level_values("target")))

@@ -183,14 +183,6 @@ class Results:
         """Of the targets of some reference rows, as displays are to show them; none for pictures from files."""
         return self.layout.shapes.get(self.display_of.get(reference, reference), ())
 
-    @property
-    def by_reference(self) -> dict[str, list[str]]:
-        """The displays that have pictures of the reference rows, by the condition of those rows."""
-        found: dict[str, list[str]] = {}
-        for condition in filter(self.has_pictures, self.conditions):
-            found.setdefault(self.reference(condition), []).append(condition)
-        return found
-
     @cached_property
     def display_of(self) -> dict[str, str]:
         """The display of every condition."""

@@ -108,7 +108,8 @@ def groups(report: Report) -> Iterator[list[Cell]]:
 
 def _truths(report: Report, target: str) -> list[Cell]:
     """The pictures of a target: one, or one for each of those displays that show it differently."""
-    return [("", reference, target) for reference in report.results.by_reference]
+    pictured = _pictured(report.results, report.results.conditions)
+    return [("", reference, target) for reference in dict.fromkeys(map(report.results.reference, pictured))]
 
 
 def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]:

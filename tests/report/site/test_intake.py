@@ -174,11 +174,6 @@ def escaping(folder: Path) -> None:
     (folder / "thumbnails" / outside.name).symlink_to(outside)
 
 
-def elsewhere(folder: Path) -> None:
-    (folder / "thumbnails").rename(folder.parent / "thumbnails")
-    (folder / "thumbnails").symlink_to(folder.parent / "thumbnails")
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -190,7 +185,7 @@ def elsewhere(folder: Path) -> None:
         (lambda folder: (folder / "thumbnails" / "a").mkdir(), ("a: a link or a folder",)),
         (lambda folder: picture(folder).rename(folder / "thumbnails" / "a.png"), ("a.png: no such cell",)),
         (escaping, ("outside.png: a link",)),
-        (elsewhere, ("thumbnails: not a folder of its own",)),
+        (linked("thumbnails"), ("thumbnails: not a folder of its own",)),
         (lambda folder: Image.new("I;16", (8, 8)).save(picture(folder)), ("more than 8 bits a channel",)),
         (lambda folder: picture(folder).rename(folder / "thumbnails" / "a\nb.png"), ("'a\\nb.png'", "rename it")),
     ],

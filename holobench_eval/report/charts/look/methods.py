@@ -3,8 +3,8 @@
 A hue is a family of methods, a marker a method in it, a tint a variant of a method within a study. The hues were
 searched by chance for the largest smallest difference (CIEDE2000, Sharma, Wu & Dalal, Color Res. Appl. 30, 2005) to
 normal eyes, to deuteranopes and protanopes (simulated as in Machado, Oliveira & Fernandes, IEEE TVCG 15, 2009) and in
-gray; ``tests/report/charts/look`` measures them. No hue is used twice: a method that is not in the registry is gray,
-with a marker of its own as far as there are markers, and charts write its name beside it.
+gray; ``tests/report/charts/test_look.py`` measures them. No hue is used twice: a method that is not in the registry is
+gray, with a marker of its own as far as there are markers, and charts write its name beside it.
 """
 
 from __future__ import annotations
