@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..data.board import GROUPS, Board, Display, Row
 from ..data.layout import ORACLE
 from ..data.phrases import verdict
-from ..data.text import FILES, number, words
+from ..data.text import FILES, grouped, number, words
 from ..markdown import Markdown, blocks, code, escape, heading, table
 
 PANEL_TIME, MEMORY = "panel time [frames]", "memory [MiB]"
@@ -56,10 +56,8 @@ def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) ->
 
 def _note(board: Board) -> Markdown:
     """What the letters are, and what a gray picture scores."""
-    score, floors = board.results.headline, dict[str, list[str]]()
-    for display in board.displays:
-        if display.floor is not None:
-            floors.setdefault(score.with_unit(display.floor), []).append(display.name)
+    known = [(each.floor, each.name) for each in board.displays if each.floor is not None]
+    floors = grouped((board.results.headline.with_unit(floor), name) for floor, name in known)
     gray = [f"{value} on {words(names)}" if len(floors) > 1 else value for value, names in floors.items()]
     floor = f" A gray picture scores {'; '.join(gray)}." if gray else ""
     letters = "A letter holds the methods of a group that no test tells from its best."

@@ -11,7 +11,7 @@ from ..data.layout import OFFLINE, ONLINE
 from ..data.phrases import difference
 from ..data.results import Results
 from ..data.sweeps import SMALL, Sweep, sweeps
-from ..data.text import percent, words
+from ..data.text import grouped, percent, words
 from ..markdown import Markdown, table_of
 from .kind import Kind, subjects
 
@@ -94,10 +94,8 @@ def _seen(here: list[Sweep]) -> Iterator[str]:
 def _ranges(here: list[Sweep]) -> Iterator[str]:
     """How far a lens moves the picture for a small loss."""
     for sweep in here:
-        ranges = dict[str, list[str]]()
-        for label in sweep.methods if sweep.swept.kind == "refocus" else ():
-            if reach := sweep.small_range(label):
-                ranges.setdefault(reach, []).append(label)
+        labels = sweep.methods if sweep.swept.kind == "refocus" else []
+        ranges = grouped((reach, label) for label in labels if (reach := sweep.small_range(label)))
         each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]
         if each:
             yield f"a lens moves the picture for at most {SMALL:g} {sweep.results.headline.unit}: {', '.join(each)}"

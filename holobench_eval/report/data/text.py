@@ -7,13 +7,16 @@ said how good a picture is, so everything that differs is here, side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from ...core.errors import listed
 from ...study.folders import FILES as FILES
 from .statistics import Estimate
+
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 def plain(values: Mapping[str, Any]) -> str:
@@ -34,6 +37,14 @@ def _value(value: Any) -> str:
 def words(names: list[str]) -> str:
     """``a``, ``a and b``, ``a, b and c``; ``a, x; and b`` where a name holds a comma."""
     return listed(names, "and")
+
+
+def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+    """The values of each key, in the order of the pairs: what has one text is told together."""
+    found: dict[K, list[V]] = {}
+    for key, value in pairs:
+        found.setdefault(key, []).append(value)
+    return found
 
 
 def number(value: float | None) -> str:

@@ -19,7 +19,7 @@ from ..answers.comparison import of_display
 from ..data import board as boards
 from ..data.phrases import verdict
 from ..data.statistics import Estimate
-from ..data.text import number
+from ..data.text import grouped, number
 from .html import slug
 from .intake import Source, text_of
 from .pictures import STAGES, Picture, figures, thumbnails
@@ -186,8 +186,5 @@ def about(method: str) -> str:
 
 def cards(found: Sequence[Study]) -> dict[str, list[Shown]]:
     """The boards that enter, by the title of their display, own ones first."""
-    shown: dict[str, list[Shown]] = {}
-    for study in sorted(found, key=lambda study: bool(study.source.by)):
-        for each in study.boards if study.enters else ():
-            shown.setdefault(each["title"], []).append(each)
-    return shown
+    entering = sorted((study for study in found if study.enters), key=lambda study: bool(study.source.by))
+    return grouped((str(each["title"]), each) for study in entering for each in study.boards)
