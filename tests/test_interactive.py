@@ -19,7 +19,7 @@ from holobench_eval import interactive
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.display.training import TrainingImage
 from holobench_eval.optics.colour import srgb_encode
-from holobench_eval.report.charts.rows import GAP, HEADER, SIDE, tile_size
+from holobench_eval.report.charts.tiles import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute, write_study
 

@@ -44,8 +44,7 @@ def twin(
     goes on with the same command.
     """
     from ..core.io import file_name
-    from ..report.data.twin import tried
-    from ..report.twin import answer, write_twin
+    from ..report.twin import answer, tried, write_twin
     from ..study.calibration import twin as twins
 
     name = output.resolve().name

@@ -179,8 +179,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     UserError
         No captures, other shapes or values, or a path that ends otherwise.
     """
-    from ..report.charts.comparison import draw_comparison
-    from ..report.charts.gallery import Column, Tile, error_limit, error_map
+    from ..report.charts.tiles import Tile, draw_comparison, error_limit, error_map
 
     place = path_of(path, "path")
     if place.suffix.lower() not in ENDINGS:
@@ -203,12 +202,12 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     for name, scores in measured.items():
         shown = _picture(match(images[name], wanted)[0])
         note = f"PSNR {scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
-        columns.append(Column(name, (Tile(shown, note),)))
+        columns.append((name, Tile(shown, note)))
         errors.append(error_map(shown, truth))
     title = "captures, each at the brightness that fits best"
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        draw_comparison(place, title, [("", truth)], columns, error_limit(errors))
+        draw_comparison(place, title, truth, columns, error_limit(errors))
     except OSError as error:
         raise UserError(f"path: '{path}' cannot be written: {error.strerror or error}") from None
     return place
@@ -232,7 +231,7 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     UserError
         There is no such file, or it is damaged.
     """
-    from ..report.compare.runs import read_run
+    from ..report.compare.paired import read_run
 
     return read_run(path_of(folder, "folder")).records
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
-from .markdown import FIGURE, Markdown, blocks
+from .markdown import DETAILS, REPORT, Markdown, blocks, captions
 from .page import write_page
 from .page.pictures import keep_copies
 from .section import Report
@@ -27,7 +27,6 @@ from .sections import sections
 OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
-REPORT, DETAILS = "report.md", "details.md"
 
 
 def build_report(
@@ -74,10 +73,9 @@ def write_report(
 
 def _kept(output: Path) -> dict[str, Markdown]:
     """The captions of the figures made of pictures that an earlier report left, by file name."""
-    texts = [path.read_text(encoding="utf-8") for name in (REPORT, DETAILS) if (path := output / name).is_file()]
     return {
         name: Markdown(caption)
-        for name, caption in FIGURE.findall("\n".join(texts))
+        for name, caption in captions(output).items()
         if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
     }
 
@@ -112,21 +110,9 @@ def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
     return texts(Results(of_study(read_records(records_csv), layout), layout))
 
 
-@dataclass(frozen=True)
-class _Printed(Report):
-    """A report whose figures go elsewhere."""
-
-    folder: Path = field(kw_only=True)
-
-    @property
-    def figures(self) -> Path:
-        return self.folder
-
-
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
-    """Draw the charts of a report for one of ``MEDIA`` into a folder; every file."""
-    parts = report.results, report.records, report.output, report.provenance, report.description
-    printed = _Printed(*parts, kept={}, folder=folder)  # none of the figures made of pictures
+    """Draw the charts of a report for one of ``MEDIA`` into a folder, none of those made of pictures; every file."""
+    printed = replace(report, kept={}, drawn=folder)
     with drawn_for(MEDIA[medium]):
         for section in sections():
             if section.applies(printed):

@@ -111,11 +111,7 @@ def simulated(
     return Display(
         name=profile.name,
         heading=f"Version {profile.version}, sha256 {profile.digest[:16]}. {profile.description}",
-        lines=(
-            f"panel: {profile.scaling_note(panel)}",
-            _optics(profile.scaled(panel).panel),
-            *_stages(profile),
-        ),
+        lines=(f"panel: {profile.scaling_note(panel)}", _optics(profile.scaled(panel).panel), *_stages(profile)),
         basis=f"{basis(profile)}{_gray(profile.panel)}",
         modelled={label: tuple(name for name in effects if name in form) for label, form in forms.items()},
         effects=len(effects),

@@ -10,7 +10,7 @@ from ..core.io import write_atomically
 from ..study.calibration.family import DOMAINS, METRICS, Family, Row, missed
 from ..study.calibration.posterior import READINGS, Marginal, Member, accepted, marginals
 from .charts.family import draw_corner
-from .markdown import Markdown, blocks, bullets, code, heading, table
+from .markdown import Markdown, blocks, bullets, code, heading, table_of
 
 SHOWN = 6  # parameters of the picture
 NARROW, WIDE = 0.7, 0.9  # of a parameter's range: determined, and not
@@ -33,6 +33,7 @@ def write_family(folder: Path, family: Family, rows: Sequence[Row], found: Seque
             "figures determine best.",
             heading("What the figures determine"),
             _marginals(order),
+            "The width is relative to that of the range: at 1 the figures say nothing.",
             _geometries(family, rows, fit),
             heading("Other ways to read the figures"),
             _readings(family, rows),
@@ -80,55 +81,51 @@ def _span(one: Marginal) -> str:
     return f"{low:.3g} to {high:.3g}"
 
 
-def _marginals(order: Sequence[Marginal]) -> Markdown:
-    head = ["parameter", "key", "unit", "drawn from", "5 %", "median", "95 %", "width of the middle half", "source"]
-    lines = [
+def _marginals(order: Sequence[Marginal]) -> Markdown | None:
+    return table_of(
         [
-            one.given.words,
-            code(one.given.name),
-            one.given.unit,
-            f"{one.given.low:g} to {one.given.high:g}",
-            *(f"{value:.3g}" for value in one.quantiles),
-            f"{one.width:.2f}",
-            one.given.source,
+            {
+                "parameter": one.given.words,
+                "key": code(one.given.name),
+                "unit": one.given.unit,
+                "drawn from": f"{one.given.low:g} to {one.given.high:g}",
+                **dict(zip(("5 %", "median", "95 %"), (f"{value:.3g}" for value in one.quantiles), strict=True)),
+                "width of the middle half": f"{one.width:.2f}",
+                "source": one.given.source,
+            }
+            for one in order
         ]
-        for one in order
-    ]
-    return blocks([table(head, lines), "The width is relative to that of the range: at 1 the figures say nothing."])
+    )
 
 
-def _geometries(family: Family, rows: Sequence[Row], fit: Sequence[Row]) -> Markdown:
+def _geometries(family: Family, rows: Sequence[Row], fit: Sequence[Row]) -> Markdown | None:
     lines = []
     for number, given in enumerate(family.geometries):
         drawn, kept = (sum(row["geometry"] == number for row in some) for some in (rows, fit))
-        lines.append([number + 1, ", ".join(f"{name} {value}" for name, value in given.items()), drawn, kept])
-    return table(["geometry", "what methods are told", "draws", "draws that fit"], lines)
+        line = {"geometry": number + 1, "what methods are told": ", ".join(f"{k} {v}" for k, v in given.items())}
+        lines.append(line | {"draws": drawn, "draws that fit": kept})
+    return table_of(lines)
 
 
-def _readings(family: Family, rows: Sequence[Row]) -> Markdown:
+def _readings(family: Family, rows: Sequence[Row]) -> Markdown | None:
     first = [one.given for one in marginals(family, accepted(family, rows))[:2]]
     lines = []
     for reading in READINGS:
         fit = accepted(family, rows, reading)
         found = {one.given.name: _span(one) for one in marginals(family, fit)} if len(fit) > 1 else {}
-        lines.append([reading.words, len(fit), *(found.get(given.name, "–") for given in first)])
-    heads = [f"{given.words}, 5 to 95 % [{given.unit}]" for given in first]
-    return table(["figures held against captures", "draws that fit", *heads], lines)
+        line: dict[str, object] = {"figures held against captures": reading.words, "draws that fit": len(fit)}
+        spans = {f"{given.words}, 5 to 95 % [{given.unit}]": found.get(given.name, "–") for given in first}
+        lines.append(line | spans)
+    return table_of(lines)
 
 
-def _members(family: Family, found: Sequence[Member]) -> Markdown:
-    scores = [f"{method}.{metric}_{DOMAINS[0]}" for method in family.figures for metric in METRICS]
-    heads = [
-        f"{method} {metric.upper()}{' [dB]' * (metric == 'psnr')}" for method in family.figures for metric in METRICS
-    ]
-    lines = [
-        [
-            member.profile.name,
-            member.draw.index,
-            member.draw.geometry + 1,
-            "yes" if member.draw.is_outside else "",
-            *(f"{member.scores[name]:.3g}" if "ssim" in name else f"{member.scores[name]:.2f}" for name in scores),
-        ]
-        for member in found
-    ]
-    return table(["display", "draw", "geometry", "outside effects", *heads], lines)
+def _members(family: Family, found: Sequence[Member]) -> Markdown | None:
+    lines = []
+    for member in found:
+        line = {"display": member.profile.name, "draw": member.draw.index, "geometry": member.draw.geometry + 1}
+        line |= {"outside effects": "yes" if member.draw.is_outside else ""}
+        for method in family.figures:
+            psnr, ssim = (member.scores[f"{method}.{metric}_{DOMAINS[0]}"] for metric in METRICS)
+            line |= {f"{method} PSNR [dB]": f"{psnr:.2f}", f"{method} SSIM": f"{ssim:.3g}"}
+        lines.append(line)
+    return table_of(lines)

@@ -8,11 +8,13 @@ nor break a table.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Self
 
 from markupsafe import Markup
 
+TEXTS = REPORT, DETAILS = "report.md", "details.md"
 # (file, caption) of a figure in a report
 FIGURE = re.compile(r"^!\[Figure \d+\]\(figures/(.+?)\)\n\n\*\*Figure \d+\.\*\* (.*)$", re.MULTILINE)
 
@@ -34,6 +36,12 @@ class Markdown(Markup):
             return cls(s)
         text = " ".join(str(s).split())
         return cls(_SPECIAL.sub(r"\\\g<0>", _TAG.sub("&lt;", _ENTITY.sub("&amp;", text))))
+
+
+def captions(folder: Path) -> dict[str, str]:
+    """The captions of the figures in the texts of a report, which are Markdown, by file name."""
+    texts = [path.read_text(encoding="utf-8") for name in TEXTS if (path := folder / name).is_file()]
+    return dict(FIGURE.findall("\n".join(texts)))
 
 
 def escape(value: object) -> Markdown:
@@ -87,6 +95,11 @@ def table(headers: Sequence[object], rows: Sequence[Sequence[object]]) -> Markdo
     numeric = [all(_NUMERIC.fullmatch(str(cell)) for cell in cells) for _, *cells in columns]
     rule = "|".join(["", *(" ---: " if right else " --- " for right in numeric), ""])
     return Markdown("\n").join([_line(headers), Markdown(rule), *map(_line, rows)])
+
+
+def table_of(rows: Sequence[Mapping[str, object]]) -> Markdown | None:
+    """A pipe table of rows that name their cells, all alike; None without rows."""
+    return table(list(rows[0]), [list(row.values()) for row in rows]) if rows else None
 
 
 def properties(rows: Iterable[tuple[object, object]]) -> Markdown:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .charts.thumbnails import Thumbnails
+from .charts.tiles import Thumbnails
 from .data.layout import Layout
 from .data.ranks import Ranks, ranks
 from .data.results import Results
@@ -27,8 +27,9 @@ class Report:
     """What sections are made from.
 
     records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
-    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by
-    file, where the thumbnails are not there to draw them from (None: they are).
+    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by file, where
+    the thumbnails are not there to draw them from (None: they are); drawn: the folder of the figures where it is none
+    of the report's.
     """
 
     results: Results
@@ -37,6 +38,7 @@ class Report:
     provenance: Mapping[str, Any]
     description: Description
     kept: Mapping[str, Markdown] | None = None
+    drawn: Path | None = None
 
     def pictures(self, pattern: str, draw: Callable[[], Iterable[tuple[Path, str]]]) -> Iterable[tuple[Path, str]]:
         """(file, caption) of figures made of pictures: drawn, or those of ``pattern`` that an earlier report left."""
@@ -52,7 +54,7 @@ class Report:
     @property
     def figures(self) -> Path:
         """The folder of the figures."""
-        return self.output / "figures"
+        return self.drawn or self.output / "figures"
 
     @cached_property
     def thumbnails(self) -> Thumbnails:

@@ -14,7 +14,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.core.files import read_regular, read_text
 from holobench_eval.core.yaml_source import load, parse
 from holobench_eval.interactive import load_records
-from holobench_eval.report.compare.runs import read_run
+from holobench_eval.report.compare.paired import read_run
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.running import provenance

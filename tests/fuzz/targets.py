@@ -24,7 +24,7 @@ from holobench_eval.lab.raw import read_raw
 from holobench_eval.lab.session.manifest import FILE as MANIFEST
 from holobench_eval.lab.session.manifest import capture_of, file_of, read_manifest
 from holobench_eval.methods.files.arrays import read_array
-from holobench_eval.report.compare.runs import records_of
+from holobench_eval.report.compare.paired import records_of
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.isolation.messages import Channel

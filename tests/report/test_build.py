@@ -8,7 +8,7 @@ from skimage.io import imread
 from holobench_eval.report import write_report
 from holobench_eval.report.description import Description, Display
 from tests.support import synthetic_study as synthetic
-from tests.support.reports import whole
+from tests.support.reports import files, whole
 
 PROVENANCE = {"package": "0.1.0", "python": "3.11.2", "cpu": "a processor", "threads": 1}
 PROVENANCE |= {"packages": {"torch": "2.13.0"}}
@@ -26,10 +26,6 @@ def minimal(records, **changes):
     kept = [r for r in records if r["cell"]["condition"] != "ideal" and r["label"] not in ("SGD", "HIL", "Oracle")]
     pairs = tuple((label, "leto-aged") for label in ("Double phase", "GS", "Wirtinger"))
     return kept, synthetic.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
-
-
-def files(folder):
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 @pytest.fixture(scope="module")

@@ -6,3 +6,8 @@ from pathlib import Path
 def whole(report: Path) -> str:
     """The text of both files. report: the path of report.md."""
     return report.read_text() + report.with_name("details.md").read_text()
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """What is in the files below a folder, by path."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

@@ -10,8 +10,8 @@ from PIL import Image
 from holobench_eval.core.hashing import digest
 from holobench_eval.display import load_profile
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.data.tables import csv_text
+from holobench_eval.report.files.tests_csv import comparison_frame
 from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 

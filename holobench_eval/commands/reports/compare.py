@@ -42,7 +42,7 @@ def compare(
     from ...core.io import write_atomically
     from ...report.compare import page
     from ...report.compare.paired import compare as pair
-    from ...report.compare.runs import read_run
+    from ...report.compare.paired import read_run
 
     console = open_console()
     comparison = pair(read_run(a), read_run(b), metric, _pairs(displays))
@@ -79,7 +79,7 @@ def _pairs(displays: Sequence[str] | None) -> dict[str, str] | None:
 def _print(console: Console, part: Part) -> None:
     console.print(f"\n{part.title}. {part.sentence}", markup=False, soft_wrap=True)
     if part.rows:
-        table = Table(*map(escape, part.headings))
+        table = Table(*map(escape, part.rows[0]))
         for row in part.rows:
-            table.add_row(*map(escape, row))
+            table.add_row(*map(escape, row.values()))
         console.print(table)

@@ -90,7 +90,7 @@ def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, wh
     UserError
         records.csv or an artifact is damaged.
     """
-    from ...report.compare.runs import read_run
+    from ...report.compare.paired import read_run
     from ...report.data.tables import DONE, score_columns
     from ...study.plan import plan as plan_cells
 
@@ -142,7 +142,7 @@ def _key(task: Task, cell: Cell) -> Key:
 
 
 def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
-    from ...report.compare.runs import CELL
+    from ...report.compare.paired import CELL
 
     rows = records.to_dict("records")
     return {(row[CELL[0]], row[CELL[1]], row[CELL[2]], row[CELL[3]]): row for row in rows}

@@ -3,17 +3,7 @@
 from __future__ import annotations
 
 from ..data.results import Results
-from . import (
-    ablation,
-    budget,
-    comparison,
-    error_budget,
-    focus,
-    over_displays,
-    prediction,
-    ranks,
-    sweeps,
-)
+from . import ablation, budget, comparison, error_budget, focus, over_displays, prediction, ranks, sweeps
 from .kind import Kind
 
 # The first that applies answers; a comparison of methods is what any study is.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..data.phrases import tested, verdict
 from ..data.results import Results
 from ..data.statistics import PairedTest
-from ..data.text import words
+from ..data.text import grouped, words
 from .kind import Kind
 
 FEWEST = 3  # variants of the baseline method that make a study an ablation
@@ -46,10 +46,9 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def _changes(results: Results, tests: list[PairedTest]) -> str:
-    score, groups = results.headline, dict[str, list[PairedTest]]()
-    for test in sorted(tests, key=lambda test: -abs(test.estimate.mean)):
-        groups.setdefault(verdict(score, test), []).append(test)
-    parts = []
+    score, parts = results.headline, []
+    largest = sorted(tests, key=lambda test: -abs(test.estimate.mean))
+    groups = grouped((verdict(score, test), test) for test in largest)
     for name, effect in (("worse", "lower"), ("better", "raise")):
         found = groups.get(name, [])
         listed = [f"{test.second} ({score.number(test.estimate.mean, signed=True)})" for test in found[:NAMED]]

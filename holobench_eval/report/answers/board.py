@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from ..data.board import GROUPS, Board, Display, Row
-from ..data.categories import ORACLE
+from ..data.layout import ORACLE
 from ..data.phrases import verdict
-from ..data.text import FILES, number, words
-from ..markdown import Markdown, blocks, code, heading, table
+from ..data.text import FILES, grouped, number, words
+from ..markdown import Markdown, blocks, code, escape, heading, table
 
 PANEL_TIME, MEMORY = "panel time [frames]", "memory [MiB]"
 SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
@@ -44,9 +42,7 @@ def display_table(board: Board, display: Display) -> Markdown:
 def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) -> list[object]:
     score, results = board.results.headline, board.results
     title, name = results.layout.titles.get(row.label), code(row.label)
-    marks = [*row.marks, *([f"{row.scored} of {len(results.targets)} targets"] * (row.scored < len(results.targets)))]
-    named = Markdown("{} ({})").format(title, name) if title else Markdown("{}").format(row.label)
-    named = Markdown(", ").join([named, *(Markdown("{}").format(mark) for mark in marks)])
+    named = Markdown(", ").join([Markdown("{} ({})").format(title, name) if title else row.label, *board.marks(row)])
     line: list[object] = [row.tier, named, score.number(row.score.mean)]
     if tested and row.test:
         sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
@@ -55,17 +51,14 @@ def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) ->
         line.append("baseline" if row.label == results.layout.baseline else "–")
     line += [each.number(value) for each, value in zip(board.beside, row.beside, strict=True)]
     known = {"photographs": row.photographs, PANEL_TIME: row.panel_time, "seconds": row.seconds, MEMORY: row.memory}
-    return line + [number(math.nan if (value := known[cost]) is None else value) for cost in costs]
+    return line + [number(known[cost]) for cost in costs]
 
 
 def _note(board: Board) -> Markdown:
     """What the letters are, and what a gray picture scores."""
-    score, floors = board.results.headline, dict[str, list[str]]()
-    for display in board.displays:
-        if display.floor is not None:
-            floors.setdefault(score.with_unit(display.floor), []).append(display.name)
-    many = len(floors) > 1
-    gray = [f"{value} on {words(names)}" if many else value for value, names in floors.items()]
+    known = [(each.floor, each.name) for each in board.displays if each.floor is not None]
+    floors = grouped((board.results.headline.with_unit(floor), name) for floor, name in known)
+    gray = [f"{value} on {words(names)}" if len(floors) > 1 else value for value, names in floors.items()]
     floor = f" A gray picture scores {'; '.join(gray)}." if gray else ""
     letters = "A letter holds the methods of a group that no test tells from its best."
-    return Markdown("{}").format(f"{letters}{floor} Brackets: 95 % intervals.")
+    return escape(f"{letters}{floor} Brackets: 95 % intervals.")

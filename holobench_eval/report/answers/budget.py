@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.categories import OFFLINE, ONLINE
+from ..data.layout import OFFLINE, ONLINE
 from ..data.phrases import tested, value, verdict
 from ..data.results import Results
-from ..data.text import number, words
+from ..data.text import grouped, number, words
 from .kind import Kind
 
 
 def families(results: Results, condition: str) -> dict[str, list[str]]:
     """Rows of a display by registered method, of methods with rows of different captures in total, fewest first."""
-    found = dict[str, list[str]]()
-    for label in results.methods(condition):
-        if label not in results.layout.privileged and results.is_complete(label, condition):
-            found.setdefault(str(results.names[label]), []).append(label)
+    rows = [label for label in results.methods(condition) if label not in results.layout.privileged]
+    found = grouped((str(results.names[label]), label) for label in rows if results.is_complete(label, condition))
     return {
         name: sorted(labels, key=lambda label: _captures(results, label, condition))
         for name, labels in found.items()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ...core.errors import listed
 from ...study.folders.files import remedies
 from ..data.board import Display, Row, board
-from ..data.categories import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..data.layout import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
 from ..data.phrases import difference, verdict
 from ..data.results import Results
 from ..data.text import FILES, number, words
@@ -87,9 +89,7 @@ def published(results: Results, label: str, condition: str) -> str:
 
 
 KIND = Kind(
-    question="Which method gives the better picture, and by how much?",
-    applies=lambda results: True,
-    verdicts=verdicts,
+    question="Which method gives the better picture, and by how much?", applies=lambda results: True, verdicts=verdicts
 )
 
 # Paper Table 2: how well does a method exploit the network that stands for the display?
@@ -103,30 +103,21 @@ ON_A_NETWORK = Kind(
 def lacking(results: Results) -> str:
     """Who lacks which targets, and what to do about it; empty where every method has a score for every target."""
     pairs = [(label, condition) for condition in results.conditions for label in results.methods(condition)]
-    lacks = {pair: missing for pair in pairs if (missing := _missing(results, *pair))}
+    missing = {pair: np.array(results.targets)[np.isnan(results.values(*pair))].tolist() for pair in pairs}
+    lacks = {pair: names for pair, names in missing.items() if names}
     if not lacks:
         return ""
-    ranked, total = len(pairs) - len(lacks), len(results.targets)
-    several = len(results.conditions) > 1
+    ranked, several = len(pairs) - len(lacks), len(results.conditions) > 1
     who = [
-        f"{label}{f' on {condition}' * several} lacks {_of(missing, total)}"
-        for (label, condition), missing in lacks.items()
+        f"{label}{f' on {condition}' * several} lacks {_of(names, len(results.targets))}"
+        for (label, condition), names in lacks.items()
     ]
     if ranked:
         have = "1 method that has every target is" if ranked == 1 else f"{ranked} methods that have every target are"
         said = f"Only the {have} ranked"
     else:
         said = "No method is ranked, since none has every target"
-    if results.layout.measure != FILES:
-        return f"{said}: {_first(who, LISTED)}. {_by_the_others(results, lacks)}"
-    holes = results.holes[["state", "label", "target", "reason"]].itertuples(index=False, name=None)
-    way = remedies((str(state), str(method), str(target), str(reason)) for state, method, target, reason in holes)
-    return f"{said}: {_first(who, LISTED)}. {_with_fewer(results, lacks, way)}"
-
-
-def _missing(results: Results, label: str, condition: str) -> list[str]:
-    values = results.values(label, condition)
-    return [name for name, value in zip(results.targets, values, strict=True) if value != value]
+    return f"{said}: {_first(who, LISTED)}. {_remedy(results, lacks)}"
 
 
 def _of(missing: list[str], total: int) -> str:
@@ -135,28 +126,20 @@ def _of(missing: list[str], total: int) -> str:
     return f"{len(missing)} of {total} targets ({_first(missing, LISTED_EACH)})"
 
 
-def _to_leave_out(results: Results, lacks: Lacks) -> tuple[list[str], int, str]:
-    """The targets without which all that have any score can be ranked, how many are left, and who is ranked then."""
-    some = [missing for missing in lacks.values() if len(missing) < len(results.targets)]
-    away = [name for name in results.targets if any(name in missing for missing in some)]
-    return away, len(results.targets) - len(away), "all" if len(some) == len(lacks) else "all that have any score"
-
-
-def _by_the_others(results: Results, lacks: Lacks) -> str:
-    """How a study ranks them all."""
-    way = "Mend what the reasons in details.md say and run the same command again"
-    away, left, who = _to_leave_out(results, lacks)
-    fewer = f", or name the other {left} targets with --targets to rank {who} by these" if away and left else ""
-    return f"{way}{fewer}."
-
-
-def _with_fewer(results: Results, lacks: Lacks, way: str) -> str:
-    """The remedies, and the targets by which all that have any score can be ranked as they are."""
-    away, left, who = _to_leave_out(results, lacks)
-    if not away or not left:
-        return way
-    moved = f"move the targets and captures of {_first(away, LISTED)} away"
-    return f"{way[:-1]}, or {moved} and rank {who} by the {left} target{'s' * (left > 1)} left."
+def _remedy(results: Results, lacks: Lacks) -> str:
+    """How all of them are ranked, or without some targets all that have any score."""
+    some = [names for names in lacks.values() if len(names) < len(results.targets)]
+    away = [name for name in results.targets if any(name in names for names in some)]
+    left, who = len(results.targets) - len(away), "all" if len(some) == len(lacks) else "all that have any score"
+    if results.layout.measure == FILES:
+        holes = results.holes[["state", "label", "target", "reason"]].itertuples(index=False, name=None)
+        way = remedies((str(state), str(method), str(target), str(reason)) for state, method, target, reason in holes)
+        moved = f"move the targets and captures of {_first(away, LISTED)} away"
+        fewer = f"{moved} and rank {who} by the {left} target{'s' * (left > 1)} left"
+    else:
+        way = "Mend what the reasons in details.md say and run the same command again."
+        fewer = f"name the other {left} targets with --targets to rank {who} by these"
+    return f"{way[:-1]}, or {fewer}." if away and left else way
 
 
 def _first(names: list[str], most: int) -> str:

@@ -11,9 +11,9 @@ from ..data.error_budget import Budget, Part, budgets
 from ..data.over_displays import is_many
 from ..data.results import Results
 from ..data.scores import Score
-from ..data.statistics import Array, Estimate
-from ..data.text import percent, words
-from ..markdown import Markdown, table
+from ..data.statistics import Array
+from ..data.text import bracketed, percent, words
+from ..markdown import Markdown, table_of
 from .kind import Kind
 
 
@@ -44,35 +44,35 @@ def _over(found: list[Budget]) -> Iterator[tuple[str, Array]]:
         yield parts[0].label, np.array([100 * part.share.mean for part in parts])
 
 
-def _interval(found: Estimate) -> str:
-    mean, low, high = (f"{value:z.1f}" for value in (found.mean, found.low, found.high))
-    return mean if low == "nan" else f"{mean} [{low}, {high}]"
-
-
 def rows(board: Board) -> Markdown | None:
     """A row a display and part: its share, what removing it and all above it would gain, what it leaves by itself, and
     the control of its model. Over many displays a row a part: the mean and the range of its share."""
     results = board.results
     if found := budgets(results) if is_many(results) else []:
-        shares = [
-            [label, f"{part.mean():.0f}", f"{part.min():.0f} to {part.max():.0f}"] for label, part in _over(found)
-        ]
-        return table(["explained by", "share of the squared error [%]", "least to most of displays"], shares)
-    lines = [
+        return table_of(
+            [
+                {
+                    "explained by": label,
+                    "share of the squared error [%]": f"{part.mean():.0f}",
+                    "least to most of displays": f"{part.min():.0f} to {part.max():.0f}",
+                }
+                for label, part in _over(found)
+            ]
+        )
+    return table_of(
         [
-            budget.condition,
-            part.label,
-            percent(part.share),
-            _interval(part.gain) if part.gain else "–",
-            percent(part.alone),
-            *(_control(results, score, part, budget.condition) for score in results.control),
+            {
+                "display": budget.condition,
+                "explained by": part.label,
+                "share of the squared error [%]": percent(part.share),
+                "PSNR gained, with all above [dB]": bracketed(part.gain, "z.1f"),
+                "left by it alone [%]": percent(part.alone),
+                **{score.heading: _control(results, score, part, budget.condition) for score in results.control},
+            }
+            for budget in budgets(results)
+            for part in budget.parts
         ]
-        for budget in budgets(results)
-        for part in budget.parts
-    ]
-    columns = ["display", "explained by", "share of the squared error [%]", "PSNR gained, with all above [dB]"]
-    columns += ["left by it alone [%]", *(score.heading for score in results.control)]
-    return table(columns, lines) if lines else None
+    )
 
 
 def _control(results: Results, score: Score, part: Part, condition: str) -> str:

@@ -8,7 +8,7 @@ from ..data.board import Board
 from ..data.phrases import difference, marked, tested, value, verdict
 from ..data.results import Results
 from ..data.text import number
-from ..markdown import Markdown, table
+from ..markdown import Markdown, table_of
 from .kind import Kind, subjects
 
 
@@ -43,30 +43,19 @@ def seconds(results: Results, label: str, condition: str) -> float:
     return holograms * float(results.row(label, condition)["solving_s"])
 
 
-def _against(results: Results, label: str, condition: str) -> str:
-    test = tested(results, label, condition)
-    return results.headline.estimate(test.estimate, signed=True) if test else "–"
-
-
 def rows(board: Board) -> Markdown | None:
     """A row a method and display: score over all planes or views, difference to the baseline, seconds a scene."""
     results = board.results
     score, baseline = results.headline, results.layout.baseline
-    lines = [
-        [
-            marked(results, label, condition),
-            condition,
-            made_of(results, label),
-            score.in_row(results.row(label, condition)),
-            *([_against(results, label, condition)] if baseline else []),
-            number(seconds(results, label, condition)),
-        ]
-        for condition in results.conditions
-        for label in results.methods(condition)
-    ]
-    against = [f"difference to {baseline}"] if baseline else []
-    headings = ["method", "display", "hologram of", score.heading, *against, "seconds a scene"]
-    return table(headings, lines) if lines else None
+    lines = []
+    for label, condition in ((label, name) for name in results.conditions for label in results.methods(name)):
+        line = {"method": marked(results, label, condition), "display": condition}
+        line |= {"hologram of": made_of(results, label), score.heading: score.in_row(results.row(label, condition))}
+        if baseline:
+            test = tested(results, label, condition)
+            line[f"difference to {baseline}"] = score.estimate(test.estimate if test else None, signed=True)
+        lines.append(line | {"seconds a scene": number(seconds(results, label, condition))})
+    return table_of(lines)
 
 
 KIND = Kind(

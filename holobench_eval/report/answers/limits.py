@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..data.categories import FLOOR
+from ..data.layout import FLOOR
 from ..data.phrases import remarks, too_few, uncovered
 from ..data.statistics import FEWEST, SIGNIFICANCE
-from ..data.text import FILES, words
+from ..data.text import FILES, grouped, words
 from ..markdown import Markdown
 from ..section import Report
 from .kind import Kind, subjects
@@ -60,10 +60,8 @@ def _sample(report: Report) -> Iterator[str]:
 
 
 def _displays(report: Report) -> Iterator[str]:
-    same: dict[str, list[str]] = {}
-    for display in report.description.displays:
-        same.setdefault(display.basis or display.heading, []).append(display.name)
-    for basis, names in same.items():
+    displays = report.description.displays
+    for basis, names in grouped((each.basis or each.heading, each.name) for each in displays).items():
         yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
     for label, model in report.description.models.items():
         yield f"{label}: descends through {model}."
@@ -73,24 +71,21 @@ def _displays(report: Report) -> Iterator[str]:
 
 def _form(report: Report) -> Iterator[str]:
     """Which methods fit a model that has the bench's own equations for some of its effects."""
-    shares: dict[str, list[tuple[int, int]]] = {}
-    for display in report.description.displays:
-        for label, effects in display.modelled.items():
-            if effects and label in report.results.methods(display.name):
-                shares.setdefault(label, []).append((len(effects), display.effects))
-    known: dict[str, list[str]] = {}
-    for label, counts in shares.items():
-        ends = dict.fromkeys(f"{own} of {of}" for own, of in (min(counts), max(counts)))
-        known.setdefault(" to ".join(ends), []).append(label)
+    shares = grouped(
+        (label, (len(effects), display.effects))
+        for display in report.description.displays
+        for label, effects in display.modelled.items()
+        if effects and label in report.results.methods(display.name)
+    )
+    ends = {label: [f"{own} of {of}" for own, of in (min(each), max(each))] for label, each in shares.items()}
+    known = grouped((" to ".join(dict.fromkeys(both)), label) for label, both in ends.items())
     parts = [f"{words(labels)} for {count}" for count, labels in known.items()]
     if parts:
         yield f"Inverse crime: effects modelled by the simulation's own equations: {'; '.join(parts)}; expect less."
 
 
 def _tuned(report: Report) -> Iterator[str]:
-    same: dict[str, list[str]] = {}
-    for label, text in report.layout.tuned.items():
-        same.setdefault(text, []).append(label)
+    same = grouped((text, label) for label, text in report.layout.tuned.items())
     parts = [f"of {words(labels)}, {text}" for text, labels in same.items()]
     if parts:
         others = "The others have the settings of their papers, of this package or of the config."
@@ -99,14 +94,12 @@ def _tuned(report: Report) -> Iterator[str]:
 
 def _weights(report: Report) -> Iterator[str]:
     """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
-    same: dict[tuple[str, ...], list[str]] = {}
+    lacking = list[tuple[tuple[str, ...], str]]()
     for training in report.trainings:
         files = (training.fact("description") or {}).get("external") or {}
         absent = tuple(name for name, digest in files.items() if digest == "absent")
-        for label in training.labels if absent else ():
-            if label in subjects(report.results) and label not in same.setdefault(absent, []):
-                same[absent].append(label)
-    for absent, labels in same.items():
+        lacking += [(absent, label) for label in training.labels if absent and label in subjects(report.results)]
+    for absent, labels in grouped(dict.fromkeys(lacking)).items():
         yield f"Weights: without {words(list(absent))}, which this machine has not, learned {words(labels)}."
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.display_map import display_map, judged
-from ..data.over_displays import Margin, applies, gains, margins, parameters, published, shown_on, winners
+from ..data import over_displays as over
+from ..data.board import Board
 from ..data.results import Results
 from ..data.statistics import cause
 from ..data.text import words
-from ..markdown import Markdown, table
+from ..markdown import Markdown, table_of
 from .kind import Kind, subjects
 
 MOST = 2  # methods that the answer names beside those of the question
@@ -18,11 +18,11 @@ MOST = 2  # methods that the answer names beside those of the question
 def verdicts(results: Results) -> Iterator[str]:
     """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
     judges their models; where no score could be had."""
-    found, asked = margins(results), subjects(results)
+    found, asked = over.margins(results), subjects(results)
     if not found:
         yield "No display has a score of every method for every target."
         return
-    count = len(shown_on(results))
+    count = len(over.shown_on(results))
     about = [each for label in asked for each in found if each.label == label]
     for each in about:
         yield f"{_told(results, each, count)}{_published(results, each)}."
@@ -32,11 +32,11 @@ def verdicts(results: Results) -> Iterator[str]:
     yield from _judged(results)
     yield from _decides(results, about or found[:1])
     if count < len(results.conditions):
-        left = [name for name in results.conditions if name not in shown_on(results)]
+        left = [name for name in results.conditions if name not in over.shown_on(results)]
         yield f"Left out, since scores are missing: {words(left)}."
 
 
-def _told(results: Results, each: Margin, count: int) -> str:
+def _told(results: Results, each: over.Margin, count: int) -> str:
     score, (low, high) = results.headline, each.spread
     worse = f" and loses on {each.worse}" if each.worse else ""
     return (
@@ -46,9 +46,9 @@ def _told(results: Results, each: Margin, count: int) -> str:
     )
 
 
-def _published(results: Results, each: Margin) -> str:
+def _published(results: Results, each: over.Margin) -> str:
     """Where the published margin falls among those of the displays."""
-    score, margin = results.headline, published(results, each.label)
+    score, margin = results.headline, over.published(results, each.label)
     if margin is None:
         return ""
     above = int((each.values >= margin).sum())
@@ -57,9 +57,9 @@ def _published(results: Results, each: Margin) -> str:
 
 def _map(results: Results) -> Iterator[str]:
     """The method that is best on most displays, and whether an error budget of a display tells where another is."""
-    found, score = display_map(results), results.headline
+    found, score = over.display_map(results), results.headline
     if found is None:
-        best = winners(gains(results))
+        best = over.winners(over.gains(results))
         usual = max(best, key=best.count)
         yield f"{usual} is best on {best.count(usual)} of {len(best)}."
         return
@@ -85,12 +85,12 @@ def _map(results: Results) -> Iterator[str]:
 
 def _judged(results: Results) -> Iterator[str]:
     """How well two scores of the models rank the methods that optimise through them."""
-    if parts := [f"{each.score} in {each.right} of {each.pairs}" for each in judged(results)]:
+    if parts := [f"{each.score} in {each.right} of {each.pairs}" for each in over.judged(results)]:
         yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
 
 
-def _decides(results: Results, about: list[Margin]) -> Iterator[str]:
-    known = parameters(results)
+def _decides(results: Results, about: list[over.Margin]) -> Iterator[str]:
+    known = over.parameters(results)
     for each in about:
         if found := cause(each.values, known):
             of = f"the margin of {each.label}"
@@ -101,30 +101,29 @@ def _decides(results: Results, about: list[Margin]) -> Iterator[str]:
                 yield f"No parameter of the displays predicts {of} (the best is {found.parameter}, {share})."
 
 
-def summary(results: Results) -> Markdown:
+def summary(board: Board) -> Markdown | None:
     """A row for every method."""
-    score, found, count = results.headline, margins(results), len(shown_on(results))
-    columns = ["method", f"over displays and pictures{score.brackets}", f"median{score.brackets}"]
-    columns += ["5 to 95 % of displays", f"better on [of {count}]", "worse on"]
-    rows = [
+    score, count = board.results.headline, len(over.shown_on(board.results))
+    return table_of(
         [
-            each.label,
-            score.estimate(each.over_both, signed=True),
-            score.number(each.median, signed=True),
-            " to ".join(score.number(end, signed=True) for end in each.spread),
-            str(each.better),
-            str(each.worse),
+            {
+                "method": each.label,
+                f"over displays and pictures{score.brackets}": score.estimate(each.over_both, signed=True),
+                f"median{score.brackets}": score.number(each.median, signed=True),
+                "5 to 95 % of displays": " to ".join(score.number(end, signed=True) for end in each.spread),
+                f"better on [of {count}]": each.better,
+                "worse on": each.worse,
+            }
+            for each in over.margins(board.results)
         ]
-        for each in found
-    ]
-    return table(columns, rows)
+    )
 
 
 KIND = Kind(
     question="On how many of the displays is a method better than the baseline, and by how much over all of them?",
-    applies=applies,
+    applies=over.applies,
     verdicts=verdicts,
-    table=lambda board: summary(board.results) if margins(board.results) else None,
+    table=summary,
     limits=(
         "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
         "Better and worse are shown by one family of tests over all methods and displays.",

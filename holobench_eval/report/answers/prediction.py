@@ -17,7 +17,7 @@ from ..data.board import Board
 from ..data.over_displays import is_many
 from ..data.phrases import tested, value, verdict
 from ..data.results import Results
-from ..data.text import words
+from ..data.text import grouped, words
 from ..markdown import Markdown, table
 from .board import board_table
 from .kind import Kind, subjects
@@ -46,13 +46,11 @@ def _controls(results: Results, condition: str) -> Iterator[str]:
 
 def _named(results: Results, condition: str) -> Iterator[str]:
     """Which networks of the question beat the baseline."""
-    baseline, groups = results.layout.baseline, dict[str, list[str]]()
-    for label in subjects(results):
-        if test := tested(results, label, condition):
-            groups.setdefault(verdict(results.headline, test), []).append(label)
+    tests = [test for label in subjects(results) if (test := tested(results, label, condition))]
+    groups = grouped((verdict(results.headline, test), test.second) for test in tests)
     parts = [f"{name}: {words(labels)}" for name, labels in groups.items()]
     if parts:
-        yield f"than {baseline}, {', '.join(parts)}"
+        yield f"than {results.layout.baseline}, {', '.join(parts)}"
 
 
 def _reported(results: Results, condition: str) -> Iterator[str]:

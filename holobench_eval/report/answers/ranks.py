@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from ..data.board import Board
 from ..data.ranks import Ranks, ranks
 from ..data.results import Results
-from ..data.text import percent, words
-from ..markdown import Markdown, table
+from ..data.text import bracketed, percent, words
+from ..markdown import Markdown, table_of
 from .kind import Kind
 
 
@@ -34,8 +32,7 @@ def _first(each: Ranks) -> str:
 def _agreement(each: Ranks) -> str:
     if not len(each.taus):
         return "all methods score the same"
-    interval = f" [{each.tau.low:.2f}, {each.tau.high:.2f}]" if np.isfinite(each.tau.low) else ""
-    return f"Kendall's tau with its ranking is {each.tau.mean:.2f}{interval}"
+    return f"Kendall's tau with its ranking is {bracketed(each.tau, '.2f')}"
 
 
 def _turning(each: Ranks) -> str:
@@ -51,13 +48,19 @@ def rows(board: Board) -> Markdown | None:
     each = next((each for each in ranks(board.results) if each.exists), None)
     if each is None:
         return None
-    lines = []
-    for index, label in enumerate(each.methods):
-        column = each.positions[:, index]
-        ends = (f"{column.min():.0f}", f"{column.max():.0f}")
-        first = percent(each.first(label))
-        lines.append([label, f"{each.nominal_positions[index]:.0f}", first, f"{column.mean():.1f}", *ends])
-    return table(["method", "nominal rank", "first in [% of draws]", "mean rank", "best rank", "worst rank"], lines)
+    return table_of(
+        [
+            {
+                "method": label,
+                "nominal rank": f"{nominal:.0f}",
+                "first in [% of draws]": percent(each.first(label)),
+                "mean rank": f"{places.mean():.1f}",
+                "best rank": f"{places.min():.0f}",
+                "worst rank": f"{places.max():.0f}",
+            }
+            for label, nominal, places in zip(each.methods, each.nominal_positions, each.positions.T, strict=True)
+        ]
+    )
 
 
 KIND = Kind(

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 from ...study.definition import Claim
 from ..data.board import Board, is_gray
-from ..data.categories import OFFLINE, ONLINE
+from ..data.layout import OFFLINE, ONLINE
 from ..data.phrases import difference
 from ..data.results import Results
 from ..data.sweeps import SMALL, Sweep, sweeps
-from ..data.text import percent, words
-from ..markdown import Markdown, table
+from ..data.text import grouped, percent, words
+from ..markdown import Markdown, table_of
 from .kind import Kind, subjects
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
@@ -94,10 +94,8 @@ def _seen(here: list[Sweep]) -> Iterator[str]:
 def _ranges(here: list[Sweep]) -> Iterator[str]:
     """How far a lens moves the picture for a small loss."""
     for sweep in here:
-        ranges = dict[str, list[str]]()
-        for label in sweep.methods if sweep.swept.kind == "refocus" else ():
-            if reach := sweep.small_range(label):
-                ranges.setdefault(reach, []).append(label)
+        labels = sweep.methods if sweep.swept.kind == "refocus" else []
+        ranges = grouped((reach, label) for label in labels if (reach := sweep.small_range(label)))
         each = [f"{text} ({words(labels)})" for text, labels in ranges.items()]
         if each:
             yield f"a lens moves the picture for at most {SMALL:g} {sweep.results.headline.unit}: {', '.join(each)}"
@@ -142,14 +140,15 @@ def rows(board: Board) -> Markdown | None:
             if (worst := sweep.worst(label)) is None:
                 continue
             value, loss = worst
-            gained = sweep.gain(label, dict(sweep.swept.points)[value]) if baseline and label != baseline else None
             online = ", solves after the change" * (results.layout.category(label) == ONLINE)
-            line = [sweep.kind.words, sweep.swept.before, f"{results.layout.marked(label)}{online}"]
-            line += [sweep.text(value), score.estimate(loss, signed=True)]
-            lines.append([*line, *([score.estimate(gained, signed=True) if gained else "–"] if baseline else [])])
-    columns = ["change", "display", "method", "worst at", f"mean loss there{score.brackets}"]
-    columns += [f"above {baseline} there{score.brackets}"] if baseline else []
-    return table(columns, lines) if lines else None
+            line = {"change": sweep.kind.words, "display": sweep.swept.before}
+            line |= {"method": f"{results.layout.marked(label)}{online}", "worst at": sweep.text(value)}
+            line |= {f"mean loss there{score.brackets}": score.estimate(loss, signed=True)}
+            if baseline:
+                gained = sweep.gain(label, dict(sweep.swept.points)[value]) if label != baseline else None
+                line |= {f"above {baseline} there{score.brackets}": score.estimate(gained, signed=True)}
+            lines.append(line)
+    return table_of(lines)
 
 
 KIND = Kind(

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from ..data.error_budget import Budget, Part
 from .look.medium import medium
-from .style import PALE, grid, laid_out, legend_below, save, style
+from .style import PALE, grid, laid_out, legend_below, note, save, style
 
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
@@ -84,15 +84,7 @@ def _gains(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> 
     for part, height in zip(links, heights, strict=True):
         if part.gain is None:
             continue
-        low, high = np.nan_to_num([part.gain.mean - part.gain.low, part.gain.high - part.gain.mean])
         colour = colours[part.label]
-        axes.errorbar(part.gain.mean, height, xerr=[[low], [high]], fmt="o", color=colour, markersize=5, capsize=2)
-        end = part.gain.mean + high
-        axes.annotate(
-            f"{part.gain.mean:z.1f}",
-            (end, height),
-            (5, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=medium().note,
-        )
+        axes.errorbar(part.gain.mean, height, xerr=part.gain.reach, fmt="o", color=colour, markersize=5, capsize=2)
+        end = part.gain.mean + part.gain.reach[1, 0]
+        note(axes, f"{part.gain.mean:z.1f}", (end, height))

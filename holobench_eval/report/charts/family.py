@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...study.calibration.family import Range, Row
-from ..data.display_map import Map
+from ..data.over_displays import Map
 from .look.medium import medium
 from .look.methods import Look
 from .style import PALE, grid, laid_out, legend_below, new_figure, save, style
@@ -72,13 +72,8 @@ def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> N
         for axes, shares, name in zip(panels.flat, 100 * found.shares.T, found.axes, strict=True):
             for label, look in looked.items():
                 values = found.margins[found.labels.index(label)]
-                given = {
-                    "marker": look.marker,
-                    "color": look.face,
-                    "edgecolor": look.colour,
-                    "s": 30 * medium().scale ** 2,
-                }
-                axes.scatter(shares, values, label=label, **given)
+                given = {"marker": look.marker, "color": look.face, "edgecolor": look.colour}
+                axes.scatter(shares, values, s=30 * medium().scale ** 2, label=label, **given)
                 ends = np.array([shares.min(), shares.max()])
                 axes.plot(ends, np.polyval(np.polyfit(shares, values, 1), ends), color=look.colour, linewidth=1)
             axes.axhline(0, color="black", linewidth=1)

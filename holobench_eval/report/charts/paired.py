@@ -15,7 +15,7 @@ from ..data.scores import Score
 from ..data.statistics import Array, Estimate
 from .look.medium import medium
 from .look.methods import Look, looks
-from .style import GREY, grid, legend_below, marks, save, slugs, stacked, style
+from .style import GREY, grid, legend_below, marks, note, save, slugs, stacked, style
 
 ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
 SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
@@ -47,8 +47,8 @@ def draw(results: Results, condition: str, path: Path) -> None:
     """
     baseline, score = results.layout.baseline, results.headline
     assert baseline is not None
-    above = results.above_floor(baseline, condition)
-    lines = {} if above is None else {"floor: a constant image": -above.mean}
+    floor, own = results.floor(condition), results.values(baseline, condition)
+    lines = {} if floor is None else {"floor: a constant image": floor - float(np.nanmean(own))}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
 
@@ -120,20 +120,13 @@ def _dots(axes: Axes, rows: Sequence[Row], names: Sequence[str], score: Score) -
         offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
         size = DOT if len(row.values) > FEW else 2 * DOT
         axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
-        mean, low, high = row.estimate.mean, row.estimate.low, row.estimate.high
-        reach = np.nan_to_num([[mean - low], [high - mean]])
-        axes.errorbar(mean, height, xerr=reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4)
-        axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
-        axes.annotate(
-            score.estimate(row.estimate, signed=True),
-            (1, height),
-            (6, 0),
-            xycoords=axes.get_yaxis_transform(),
-            textcoords="offset points",
-            va="center",
-            fontsize=medium().note,
-            annotation_clip=False,
+        mean = row.estimate.mean
+        axes.errorbar(
+            mean, height, xerr=row.estimate.reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4
         )
+        axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
+        end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}
+        note(axes, score.estimate(row.estimate, signed=True), (1, height), **end)
     axes.set_yticks(range(len(rows)), names, parse_math=False, fontsize=medium().note)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)

@@ -11,6 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from ..data.ranks import Ranks
+from ..data.text import bracketed
 from .look.medium import medium
 from .style import GREY, PALE, grid, new_figure, save, style
 
@@ -70,10 +71,10 @@ def _agreement(axes: Axes, ranks: Ranks) -> None:
     steps, draws = np.unique(((1 - ranks.taus) / step).round(), return_counts=True)
     axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=PALE)
     top = 1.22 * draws.max()
-    ends = np.nan_to_num([[mean.mean - mean.low], [mean.high - mean.mean]])
-    axes.errorbar([mean.mean], [0.93 * top], xerr=ends, fmt="o", color=GREY, markersize=5, capsize=3, elinewidth=1.2)
-    interval = f" [{mean.low:.2f}, {mean.high:.2f}]" if np.isfinite(mean.low) else ""
-    axes.set_title(f"mean tau {mean.mean:.2f}{interval}", loc="left")
+    axes.errorbar(
+        [mean.mean], [0.93 * top], xerr=mean.reach, fmt="o", color=GREY, markersize=5, capsize=3, elinewidth=1.2
+    )
+    axes.set_title(f"mean tau {bracketed(mean, '.2f')}", loc="left")
     axes.axvline(0, color="black", linewidth=0.8, linestyle="--")
     axes.set_xlim(min(0.0, ranks.taus.min()) - 0.08, 1.08)
     axes.set_ylim(0, top)

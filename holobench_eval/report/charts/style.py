@@ -88,6 +88,12 @@ def marks(look: Look, size: float) -> dict[str, Any]:
     return {"marker": look.marker, "markersize": scaled, "markerfacecolor": look.face, "markeredgecolor": edge}
 
 
+def note(axes: Axes, text: str, place: tuple[float, float], **more: Any) -> None:
+    """Small words to the right of a place; more: as of ``Axes.annotate``."""
+    given: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points", "va": "center", "fontsize": medium().note}
+    axes.annotate(text, place, **(given | more))
+
+
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
     """Pale lines behind everything that is drawn."""
     axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)

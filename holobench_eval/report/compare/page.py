@@ -11,22 +11,19 @@ import pandas as pd
 from ..data.scores import Score
 from ..data.tables import csv_text
 from ..data.text import words
-from ..markdown import Markdown, blocks, heading
-from ..markdown import table as markdown_table
-from .paired import EQUAL, Comparison, Row
-from .runs import provenance_differences
+from ..markdown import Markdown, blocks, heading, table_of
+from .paired import EQUAL, Comparison, Row, provenance_differences
 
 TARGETS = 10  # that changed most, in the list
 
 
 @dataclass(frozen=True)
 class Part:
-    """A table of a comparison: its title, a sentence, headings and rows of plain text, which may be none."""
+    """A table of a comparison: its title, a sentence, and rows of plain text by their headings, which may be none."""
 
     title: str
     sentence: str
-    headings: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
+    rows: list[dict[str, str]]
 
 
 def parts(comparison: Comparison) -> Iterator[Part]:
@@ -46,8 +43,7 @@ def markdown(comparison: Comparison) -> str:
 def _markdown(part: Part) -> Iterator[object]:
     yield heading(part.title)
     yield part.sentence
-    if part.rows:
-        yield markdown_table(part.headings, part.rows)
+    yield table_of(part.rows)
 
 
 def csv(comparison: Comparison) -> str:
@@ -94,15 +90,21 @@ def _differences(comparison: Comparison) -> Part:
     protocols = [words(sorted(set(map(str, run.records.get("protocol", ()))))) for run in (comparison.a, comparison.b)]
     if protocols[0] != protocols[1]:
         sentence += f" A is scored by metric protocol {protocols[0]} and B by {protocols[1]}."
-    headings = ("method", "display", "targets", "A", "B", "B - A", "verdict")
-    return Part("Differences", sentence, headings, tuple(_difference(row, score) for row in changed))
+    return Part("Differences", sentence, [_difference(row, score) for row in changed])
 
 
-def _difference(row: Row, score: Score) -> tuple[str, ...]:
+def _difference(row: Row, score: Score) -> dict[str, str]:
     change = row.change
     interval = "" if np.isnan(change.low) else f" [{_change(score, change.low)}, {_change(score, change.high)}]"
-    means = (score.number(float(values.mean())) for values in (row.a, row.b))
-    return (row.method, row.display, str(change.n), *means, f"{_change(score, change.mean)}{interval}", row.verdict)
+    return {
+        "method": row.method,
+        "display": row.display,
+        "targets": str(change.n),
+        "A": score.number(float(row.a.mean())),
+        "B": score.number(float(row.b.mean())),
+        "B - A": f"{_change(score, change.mean)}{interval}",
+        "verdict": row.verdict,
+    }
 
 
 def _change(score: Score, value: float) -> str:
@@ -113,27 +115,29 @@ def _change(score: Score, value: float) -> str:
 
 def _targets(comparison: Comparison) -> Part:
     score, most = comparison.score, comparison.moved(TARGETS)
-    headings = ("target", "method", "display", "A", "B", "B - A")
-    rows = (
-        (target, row.method, row.display, score.number(a), score.number(b), _change(score, b - a))
+    rows = [
+        {"target": target, "method": row.method, "display": row.display}
+        | {"A": score.number(a), "B": score.number(b), "B - A": _change(score, b - a)}
         for row, target, a, b in most
-    )
+    ]
     sentence = f"The {len(most)} largest changes of a target." if most else "No target has changed."
-    return Part("Targets that changed most", sentence, headings, tuple(rows))
+    return Part("Targets that changed most", sentence, rows)
 
 
 def _unpaired(comparison: Comparison) -> Part:
-    headings = ("run", "method", "display", "cells", "in the other run")
-    rows = tuple((u.run, u.method, u.display, str(u.cells), u.why) for u in comparison.unpaired)
+    rows = [
+        {"run": u.run, "method": u.method, "display": u.display, "cells": str(u.cells), "in the other run": u.why}
+        for u in comparison.unpaired
+    ]
     sentence = "Cells with a score in one run alone. They are in no mean above." if rows else "Nothing."
-    return Part("Only in one run", sentence, headings, rows)
+    return Part("Only in one run", sentence, rows)
 
 
 def _provenance(comparison: Comparison) -> Part:
     a, b = comparison.a, comparison.b
     lacking = [name for name, run in (("A", a), ("B", b)) if not run.provenance]
-    rows = tuple(provenance_differences(a, b))
+    rows = [{"fact": name, "A": first, "B": second} for name, first, second in provenance_differences(a, b)]
     sentence = "What the two runs were computed with, where it differs." if rows else "No recorded fact differs."
     if lacking:
         sentence = f"{words(lacking)} {'has' if len(lacking) == 1 else 'have'} no provenance.json. {sentence}"
-    return Part("Provenance", sentence, ("fact", "A", "B"), rows)
+    return Part("Provenance", sentence, rows)

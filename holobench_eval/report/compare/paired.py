@@ -1,19 +1,86 @@
-"""Paired differences of two runs: the same method on the same targets, in one run and in the other."""
+"""Paired differences of two runs: the same method on the same targets, in one run and in the other.
+
+A run is a report, of which the records and the provenance are read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ...core.errors import UserError, suggest
+from ...core.errors import UserError, one_line, suggest
 from ...study.plan import REFERENCE, is_reference
+from ...study.running import provenance
 from ..data.scores import Score, parse
 from ..data.statistics import Array, Estimate, family_p, mean_interval
-from ..data.tables import DONE, clusters_in, score_columns
-from .runs import CELL, Run
+from ..data.tables import DONE, clusters_in, read_records, records_text, score_columns
+
+# What names a cell in records.csv whatever code computed it: the same in two runs of a study.
+CELL = ("label", "condition", "target", "repeat")
+# What the provenance of a run says about its numbers; packages and displays are listed one by one.
+_FACTS = ("package", "revision", "dirty", "harness", "config", "config_sha256", "python", "platform", "cpu", "device")
+_UNKNOWN = "not recorded"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A report: its folder, its records (``tables.read_records``) and its provenance (empty: there is none)."""
+
+    folder: Path
+    records: pd.DataFrame
+    provenance: Mapping[str, Any]
+
+
+def read_run(folder: Path) -> Run:
+    """Read a report. UserError: the folder holds no records.csv, or one that names a cell twice."""
+    try:
+        text = records_text(folder / "records.csv")
+    except (FileNotFoundError, NotADirectoryError):
+        raise UserError(f"{folder}: no records.csv in this folder; expected the folder of a report") from None
+    return Run(folder, records_of(folder, text), provenance.read(folder))
+
+
+def records_of(folder: Path, text: str) -> pd.DataFrame:
+    """The records in the text of the records.csv of a folder. UserError: it is none, or names a cell twice."""
+    try:
+        records = read_records(text)
+    except (UserError, ValueError) as error:
+        raise UserError(f"{folder}: {error}") from None
+    twice = records[records.duplicated(list(CELL))]
+    if len(twice):
+        named = ", ".join(str(twice.iloc[0][column]) for column in CELL[:3])
+        raise UserError(f"{folder / 'records.csv'}: two rows for one cell ({named}); expected a row a cell")
+    return records
+
+
+def provenance_differences(a: Run, b: Run) -> list[tuple[str, str, str]]:
+    """(fact, in A, in B) for every fact of the two provenances that differs."""
+    facts = [dict(_facts(run.provenance)) for run in (a, b)]
+    names = dict.fromkeys([*facts[0], *facts[1]])
+    pairs = ((name, *(known.get(name, _UNKNOWN) for known in facts)) for name in names)
+    return [(name, first, second) for name, first, second in pairs if first != second]
+
+
+def _facts(known: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for name in (*_FACTS, "gpu", "threads"):
+        if known.get(name) is not None:
+            yield name.replace("_", " "), one_line(str(known[name]))
+    for group, entries in (("package", known.get("packages")), ("display", known.get("profiles"))):
+        for name, value in entries.items() if isinstance(entries, Mapping) else ():
+            yield one_line(f"{group} {name}"), one_line(_version(value))
+
+
+def _version(value: Any) -> str:
+    """A package's version, or the version and digest of a display's profile."""
+    if not isinstance(value, Mapping):
+        return str(value)
+    return f"version {value.get('version')}, sha256 {str(value.get('sha256'))[:12]}"
+
 
 A, B = "_in_a", "_in_b"  # ends of the columns of paired cells
 EQUAL = "equal"  # the verdict of rows in which no target has changed
@@ -139,9 +206,7 @@ def compare(a: Run, b: Run, metric: str | None = None, displays: Mapping[str, st
             f"{a.folder} and {b.folder}: no scored cell in common (paired by method, display, target and repeat); "
             "--displays A=B pairs displays of different names"
         )
-    clusters = clusters_in(b.records) | clusters_in(a.records)
-    groups = both.groupby(["label", f"{OWN}{A}", f"{OWN}{B}"], sort=False)
-    rows = _tested([_row(group, score, clusters) for _, group in groups], clusters)
+    rows = _rows(both, score, clusters_in(b.records) | clusters_in(a.records))
     rows.sort(key=lambda row: (row.verdict == EQUAL, row.verdict != "worse", row.gain))
     unpaired = (*_unpaired("A", first, second), *_unpaired("B", second, first))
     unchanged = int((both[f"cell{A}"] == both[f"cell{B}"]).sum())
@@ -201,25 +266,20 @@ def _scored(cells: pd.DataFrame) -> pd.DataFrame:
     return cells[cells["value"].notna()]
 
 
-def _row(group: pd.DataFrame, score: Score, clusters: Mapping[str, str]) -> Row:
-    means = group.groupby("target", sort=False)[[f"value{A}", f"value{B}"]].mean()
-    targets = tuple(map(str, means.index))
-    a, b = (means[f"value{end}"].to_numpy(dtype=np.float64) for end in (A, B))
-    change = mean_interval(b - a, [clusters.get(target, target) for target in targets])
-    of_a, of_b = (str(group[f"{OWN}{end}"].iloc[0]) for end in (A, B))
-    method = str(group["label"].iloc[0])
-    return Row(method, (of_a, of_b), targets, a, b, change, float("nan"), score.higher_is_better)
-
-
-def _tested(rows: Sequence[Row], clusters: Mapping[str, str]) -> list[Row]:
-    """The rows with p values, adjusted for all of them."""
-    targets = list(dict.fromkeys(target for row in rows for target in row.targets))
-    place = {target: index for index, target in enumerate(targets)}
-    differences = np.full((len(rows), len(targets)), np.nan)
-    for line, row in zip(differences, rows, strict=True):
-        line[[place[target] for target in row.targets]] = row.b - row.a
-    p = family_p(differences, [clusters.get(target, target) for target in targets])
-    return [replace(row, p=float(value)) for row, value in zip(rows, p, strict=True)]
+def _rows(both: pd.DataFrame, score: Score, clusters: Mapping[str, str]) -> list[Row]:
+    """A row for each method and pair of displays, with p values that are adjusted for all of them."""
+    keys = ["label", f"{OWN}{A}", f"{OWN}{B}"]
+    means = both.groupby([*keys, "target"], sort=False)[[f"value{A}", f"value{B}"]].mean()
+    differences = (means[f"value{B}"] - means[f"value{A}"]).unstack("target", sort=False)
+    adjusted = family_p(differences.to_numpy(), [clusters[str(target)] for target in differences])
+    found = []
+    for ((method, of_a, of_b), group), p in zip(means.groupby(level=keys, sort=False), adjusted, strict=True):
+        targets = tuple(map(str, group.index.get_level_values("target")))
+        first, second = group.to_numpy(dtype=np.float64).T
+        change = mean_interval(second - first, [clusters[target] for target in targets])
+        names = str(of_a), str(of_b)
+        found.append(Row(str(method), names, targets, first, second, change, float(p), score.higher_is_better))
+    return found
 
 
 def _unpaired(run: str, cells: pd.DataFrame, others: pd.DataFrame) -> Iterator[Unpaired]:

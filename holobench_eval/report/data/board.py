@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
+from .layout import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .phrases import marks, tested, verdict
-from .results import CONSTANT, Results
+from .results import Results
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
 from .tables import to_json
@@ -79,6 +79,11 @@ class Board:
     beside: tuple[Score, ...]
     displays: tuple[Display, ...]
 
+    def marks(self, row: Row) -> list[str]:
+        """What must be known of a row, and of how many targets it has a score where that is not all."""
+        total = len(self.results.targets)
+        return [*row.marks, *([f"{row.scored} of {total} targets"] * (row.scored < total))]
+
     def as_json(self) -> dict[str, Any]:
         """Ready for JSON: no NaN, and six significant digits as in table.csv."""
         layout, score = self.results.layout, self.results.headline
@@ -136,7 +141,7 @@ def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Dis
         labels = [label for label in results.methods(condition) if results.layout.category(label) == category]
         if labels:
             groups.append((category, tuple(_rows(results, condition, labels, beside))))
-    return Display(condition, tuple(groups), _floor(results, condition))
+    return Display(condition, tuple(groups), results.floor(condition))
 
 
 def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Score, ...]) -> Iterator[Row]:
@@ -157,22 +162,13 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
             _known(row, "panel_time"),
             _known(row, "solving_s"),
             _known(row, "memory_mib"),
-            (
-                *marks(results, label, condition),
-                *(["no better than gray"] * is_gray(results, label, condition)),
-            ),
+            (*marks(results, label, condition), *(["no better than gray"] * is_gray(results, label, condition))),
         )
-
-
-def _floor(results: Results, condition: str) -> float | None:
-    """The mean of a constant image."""
-    has_one = CONSTANT in results.floors and results.has_pictures(condition)
-    return _mean(results, CONSTANT, results.reference(condition)) if has_one else None
 
 
 def is_gray(results: Results, label: str, condition: str) -> bool:
     """Whether the mean of a method is no better than that of a constant image, where one was scored."""
-    mean, floor = _mean(results, label, condition), _floor(results, condition)
+    mean, floor = _mean(results, label, condition), results.floor(condition)
     return floor is not None and math.isfinite(mean) and not results.headline.better(mean, floor)
 
 

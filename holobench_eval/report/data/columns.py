@@ -16,9 +16,8 @@ import numpy as np
 import pandas as pd
 
 from ...study.plan import is_reference
-from .categories import FLOOR
 from .column import DONE, Cells, Column, Record, column, first, if_known, if_trained, mean, median
-from .layout import Layout
+from .layout import FLOOR, Layout
 from .text import FILES
 
 Row = Mapping[Any, Any]  # of records.csv, as far as its records say

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -14,15 +13,26 @@ from ...core import plugins
 from ...datasets.base import clusters_of
 from ...display.simulated.changes import KINDS, draws
 from ...display.simulated.profile import Profile, load_profile
-from ...display.traits import traits_of
 from ...study import isolation
 from ...study.config import load_study
 from ...study.definition import PREDICTIONS, Claim, Study
 from ...study.displays import Condition, changed, displays
 from ...study.plan import is_reference
 from ...study.stacks import at_once, stacks_of
-from .categories import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .text import AS_STORED, BY_MEASURE, COMPARED, FILES, ON_A_NETWORK, REAL, Text, plain
+
+# Who competes with whom: methods are ranked among those that were given as much of the camera.
+OPEN_LOOP = "open loop"
+CALIBRATED = "calibrated"
+ONLINE = "online"
+ORACLE = "oracle"
+GIVEN = "given"
+FLOOR = "floor"  # in files, of rows that no method made
+
+# In the order of tables.
+CATEGORIES = (OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN)
+# Methods that, as far as is known, never see a capture of the scored image: their holograms are ready before it.
+OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)
 
 RATIO = "1"  # unit of a swept ratio
 
@@ -85,9 +95,8 @@ class Layout:
     reported: published figures by label, ``{label: {metric: value}}``, and where they were published;
     reported_beside: the condition whose rows they stand beside (None: every one's).
     question: what the study asks (empty: what its kind asks); would_change: which result would change the answer;
-    about: what a method or a display is whose name does not say it, by label or condition; titles: names for
-    people, by label, where it begins with the method's name; tuned: on what the settings of methods were chosen, by
-    label.
+    titles: names for people, by label, where it begins with the method's name; tuned: on what the settings of methods
+    were chosen, by label.
     note: a paragraph that the study wants among its limits. measure: that of the study, or ``files`` (pictures that
     were given as files; values: how they were read, ``stored``, ``srgb`` or ``linear``);
     holograms: whose captures are predicted, with parameters. planes: scene of every target of focal stacks or light
@@ -117,7 +126,6 @@ class Layout:
     reported_beside: str | None = None
     question: str = ""
     would_change: str = ""
-    about: Mapping[str, str] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     tuned: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
@@ -238,7 +246,6 @@ def layout_of(study: Study) -> Layout:
         reported_beside=names[reported.beside] if reported and reported.beside else None,
         question=study.question,
         would_change=study.would_change,
-        about=_about(study, profiles),
         titles={
             entry.label: f"{title}{entry.label.removeprefix(entry.name)}"
             for entry in study.methods
@@ -273,19 +280,6 @@ def layout_of(study: Study) -> Layout:
         profiles=profiles,
         related={name: layout_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
     )
-
-
-def _about(study: Study, profiles: Mapping[str, Profile]) -> dict[str, str]:
-    """What methods and displays are that go by their registered name alone, or read files: the first sentence of a
-    docstring, the description of a profile."""
-    methods = {
-        entry.label: (inspect.getdoc(cls) or "").partition("\n\n")[0]
-        for entry in study.methods
-        for cls in [isolation.find(entry.name, study.folder)]
-        if entry.label == entry.name.rpartition(":")[2] or "files" in traits_of(cls).functions  # others made the phases
-    }
-    described = {name: profile.description for name, profile in profiles.items()}
-    return {name: " ".join(text.replace("`", "").split()) for name, text in (methods | described).items() if text}
 
 
 def network_of(params: Any) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from ...core.errors import one_line
 from ...study.folders.files import named
 from .column import DONE
-from .results import CONSTANT, Results
+from .results import Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
 from .text import words
@@ -80,11 +80,12 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
     layout = results.layout
     if label not in layout.trained - layout.identities or not results.is_complete(label, condition):
         return []
-    rows = [("the ideal image", name, condition) for name in layout.identities if name in results.methods(condition)]
-    if CONSTANT in results.floors and results.has_pictures(condition):
-        rows.insert(0, ("the constant image", CONSTANT, results.reference(condition)))
+    untrained = [name for name in layout.identities if name in results.methods(condition)]
+    means = [("the ideal image", results.values(name, condition).mean()) for name in untrained]
+    if (floor := results.floor(condition)) is not None:
+        means.insert(0, ("the constant image", floor))
     ours, better = results.values(label, condition).mean(), results.headline.better
-    return [text for text, name, where in rows if better(results.values(name, where).mean(), ours)]
+    return [text for text, mean in means if better(mean, ours)]
 
 
 def _dominating(results: Results, label: str, condition: str) -> str:

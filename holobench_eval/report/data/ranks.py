@@ -11,8 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
-from .categories import OFFLINE
-from .layout import Swept
+from .layout import OFFLINE, Swept
 from .results import Results
 from .statistics import Array, Cause, Estimate, cause, mean_interval
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ...core.errors import UserError, suggest
 from ...metrics import control
 from ...study.plan import FLOORS, REFERENCE, is_reference, reference_of
-from .categories import FLOOR, OFFLINE, ORACLE
-from .layout import Layout
+from .layout import FLOOR, OFFLINE, ORACLE, Layout
 from .scores import Score, parse
 from .statistics import Array, Estimate, PairedTest, family_p, mean_interval
 from .tables import DONE, clusters_in, per_target, score_columns, table_from_records
@@ -184,14 +183,6 @@ class Results:
         """Of the targets of some reference rows, as displays are to show them; none for pictures from files."""
         return self.layout.shapes.get(self.display_of.get(reference, reference), ())
 
-    @property
-    def by_reference(self) -> dict[str, list[str]]:
-        """The displays that have pictures of the reference rows, by the condition of those rows."""
-        found: dict[str, list[str]] = {}
-        for condition in filter(self.has_pictures, self.conditions):
-            found.setdefault(self.reference(condition), []).append(condition)
-        return found
-
     @cached_property
     def display_of(self) -> dict[str, str]:
         """The display of every condition."""
@@ -230,9 +221,8 @@ class Results:
             for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
-    def above_floor(self, label: str, condition: str) -> Estimate | None:
-        """Headline score minus that of a constant image, target by target; None without one, or without a target."""
+    def floor(self, condition: str) -> float | None:
+        """The mean of a constant image under ``condition``; None where none was scored against its pictures."""
         if CONSTANT not in self.floors or not self.has_pictures(condition):
             return None
-        found = self.estimate(self.values(label, condition) - self.values(CONSTANT, self.reference(condition)))
-        return found if found.n else None
+        return float(self.values(CONSTANT, self.reference(condition)).mean())

@@ -117,8 +117,10 @@ class Score:
         digits = METRICS[self.metric].digits if self.metric in METRICS else 3
         return f"{value:{'+' if signed else ''}z.{digits}f}"
 
-    def estimate(self, estimate: Estimate, signed: bool = False, unit: bool = False) -> str:
-        """``17.62 [16.90, 18.31]``; the mean alone where there is no interval. unit: of the mean."""
+    def estimate(self, estimate: Estimate | None, signed: bool = False, unit: bool = False) -> str:
+        """``17.62 [16.90, 18.31]``; the mean alone where there is no interval, a dash for None. unit: of the mean."""
+        if estimate is None:
+            return "–"
         mean = (self.with_unit if unit else self.number)(estimate.mean, signed)
         low, high = (self.number(value, signed) for value in (estimate.low, estimate.high))
         return mean if np.isnan(estimate.low) else f"{mean} [{low}, {high}]"

@@ -47,6 +47,11 @@ class Estimate:
         return self.low > 0 or self.high < 0
 
     @property
+    def reach(self) -> Array:
+        """How far the interval reaches down and up, ``(2, 1)`` as bars are drawn; 0 where there is none."""
+        return np.nan_to_num([[self.mean - self.low], [self.high - self.mean]])
+
+    @property
     def detectable(self) -> float:
         """The smallest mean difference that a t test of it alone shows with a probability of ``POWER``, in size: the
         standard error times two quantiles of t (Bloom, Evaluation Review 19, 547, 1995). NaN without an interval."""

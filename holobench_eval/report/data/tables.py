@@ -21,10 +21,9 @@ from ...core.errors import UserError
 from ...core.files import CONTROLS, read_text
 from ...study.plan import FLOORS, Plan, is_reference
 from . import columns
-from .categories import FLOOR, ORACLE
 from .column import DONE as DONE
 from .column import Cells, Column, Record
-from .layout import Layout
+from .layout import FLOOR, ORACLE, Layout
 from .scores import order_scores, parse
 from .statistics import mean_interval
 

@@ -7,13 +7,16 @@ said how good a picture is, so everything that differs is here, side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from ...core.errors import listed
 from ...study.folders import FILES as FILES
 from .statistics import Estimate
+
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 def plain(values: Mapping[str, Any]) -> str:
@@ -36,9 +39,19 @@ def words(names: list[str]) -> str:
     return listed(names, "and")
 
 
-def number(value: float) -> str:
-    """Four significant digits at most, no exponent for everyday sizes; a dash for NaN."""
-    return "–" if math.isnan(value) else f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
+def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+    """The values of each key, in the order of the pairs: what has one text is told together."""
+    found: dict[K, list[V]] = {}
+    for key, value in pairs:
+        found.setdefault(key, []).append(value)
+    return found
+
+
+def number(value: float | None) -> str:
+    """Four significant digits at most, no exponent for everyday sizes; a dash for NaN and None."""
+    if value is None or math.isnan(value):
+        return "–"
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def sample(estimate: Estimate, total: int) -> str:
@@ -47,12 +60,17 @@ def sample(estimate: Estimate, total: int) -> str:
     return f"{estimate.n} of {total} targets{among}"
 
 
-def percent(estimate: Estimate | None) -> str:
-    """A share in percent with its interval, where there is one; a dash for None."""
+def bracketed(estimate: Estimate | None, form: str, scale: float = 1.0) -> str:
+    """A mean with its interval, where there is one, scaled and as numbers of a form; a dash for None."""
     if estimate is None:
         return "–"
-    mean, low, high = (f"{100 * value:z.0f}" for value in (estimate.mean, estimate.low, estimate.high))
+    mean, low, high = (f"{scale * value:{form}}" for value in (estimate.mean, estimate.low, estimate.high))
     return mean if math.isnan(estimate.low) else f"{mean} [{low}, {high}]"
+
+
+def percent(estimate: Estimate | None) -> str:
+    """A share in percent."""
+    return bracketed(estimate, "z.0f", 100)
 
 
 def p_value(p: float) -> str:

@@ -9,11 +9,11 @@ import pandas as pd
 
 from ...core.io import write_atomically
 from ..data.board import board
-from ..data.comparisons import comparison_frame
 from ..data.results import Results
 from ..data.tables import csv_text
 from .dictionary import File, dictionary
 from .latex import latex_tables
+from .tests_csv import comparison_frame
 
 
 def texts(results: Results) -> dict[str, str]:

@@ -9,11 +9,11 @@ import pandas as pd
 
 from ..data.column import Column
 from ..data.columns import recorded, tabled
-from ..data.comparisons import of_tests
 from ..data.scores import DOMAIN_NAMES, METRICS, Score, parse
 from ..data.statistics import LEVEL
 from ..data.tables import PUBLISHED
 from ..markdown import Markdown, blocks, code, heading, table
+from .tests_csv import of_tests
 
 File = Literal["records.csv", "table.csv", "tests.csv"]
 

@@ -56,10 +56,7 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {
-                    "name": text.floor_name(floor),
-                    "mean": to_json(results.row(floor, results.reference(name))[column]),
-                }
+                {"name": text.floor_name(floor), "mean": to_json(results.row(floor, results.reference(name))[column])}
                 for floor in results.floors
                 if results.has_pictures(name)
             ]

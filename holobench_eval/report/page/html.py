@@ -22,7 +22,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from ...core.io import write_atomically
-from ..markdown import FIGURE, blocks
+from ..markdown import blocks, captions
 from ..section import Report
 from ..sections import sections
 from ..sections.answer import counts
@@ -74,7 +74,7 @@ def page(report: Report) -> str:
         data=data,
         json=Markup(json_text(data)),
         scripts=map(Markup, scripts),
-        contents=(base64.b64encode(content).decode() for content in held.contents),
+        contents=(base64.b64encode(content).decode() for content in held.values()),
     )
 
 
@@ -123,8 +123,7 @@ def _hash(text: str) -> str:
 
 def _charts(report: Report) -> Iterator[tuple[str, str]]:
     """(address, caption) of the charts of the report, as far as they are there."""
-    paths = [path for name in ("report.md", "details.md") if (path := report.output / name).is_file()]
-    for name, caption in FIGURE.findall("\n".join(path.read_text(encoding="utf-8") for path in paths)):
+    for name, caption in captions(report.output).items():
         path = report.figures / name
         if any(fnmatch(name, f"{pattern}.*") for pattern in CHARTS) and path.is_file():
             kind = "jpeg" if path.suffix == ".jpg" else "png"

@@ -5,71 +5,64 @@ from __future__ import annotations
 import io
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from PIL import Image
 
 from ...core.io import write_atomically
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
-from ..charts.gallery import spread
+from ..charts.tiles import spread
 from ..data.results import Results
 from ..section import Report
 from .data import Json
 
 TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit
 
+Key = TypeVar("Key")
 Cell = tuple[str, str, str]  # method, condition, target; a target itself has neither method nor condition
 MOST_BYTES = 3_000_000  # of all pictures of a report
 QUALITY = 85  # of WebP, 0 to 100: a sixth of the bytes of PNG
 MARK, SAYS = "README.md", b"Small copies of the pictures of the report beside this folder, written with it.\n"
 
 
-@dataclass
-class Pictures:
-    """The pictures of a page, as files; ``room``: bytes that more of them may take."""
-
-    room: int
-    contents: list[bytes] = field(default_factory=list)
-    numbers: dict[Cell, int] = field(default_factory=dict)
-
-    def add(self, group: dict[Cell, Path]) -> None:
-        """Take the pictures that are new, all or, where they do not fit, none."""
-        new = {cell: path for cell, path in group.items() if cell not in self.numbers}
-        if (taken := encoded_length(new.values())) <= self.room:
-            self.room -= taken
-            for cell, path in new.items():
-                self.numbers[cell] = len(self.contents)
-                self.contents.append(path.read_bytes())
+def _fitting(
+    groups: Iterable[Mapping[Key, Path]],
+    room: int,
+    content: Callable[[Path], bytes],
+    size: Callable[[bytes], int] = len,
+) -> dict[Key, bytes]:
+    """The contents of groups of files, first things first: what is new of a group comes all or, without room, not."""
+    kept = dict[Key, bytes]()
+    for group in groups:
+        new = {key: content(path) for key, path in group.items() if key not in kept}
+        if (taken := sum(map(size, new.values()))) <= room:
+            kept, room = kept | new, room - taken
+    return kept
 
 
-def encoded_length(paths: Iterable[Path]) -> int:
-    """Bytes of base64 that the files take."""
-    return sum(-(-path.stat().st_size // 3) * 4 for path in paths)
+def _base64_length(content: bytes) -> int:
+    return -(-len(content) // 3) * 4
 
 
-def pictures(report: Report, room: int) -> tuple[Pictures, Json]:
-    """The pictures that fit into ``room`` bytes, and what the page says of them.
+def pictures(report: Report, room: int) -> tuple[dict[Cell, bytes], Json]:
+    """The pictures that fit into ``room`` bytes of base64, and what the page says of them.
 
     Where not all fit, first come ``TARGETS_IN_FULL`` targets, evenly spaced from worst to best, with the captures of
     all methods on every display; then, target by target, the best method, the baseline and the oracle on every
     display; then the same on the changed displays, for the first targets only. A target's pictures come all or not.
     """
-    found = Pictures(room)
     everything = files(report, planned(report))
-    if encoded_length(everything.values()) <= room:
-        found.add(everything)
-    else:
-        for wanted in groups(report):
-            found.add({cell: everything[cell] for cell in wanted if cell in everything})
-    return found, {**_numbers(report, found), "note": _note(report, len(found.numbers), len(everything))}
+    some = ({cell: everything[cell] for cell in wanted if cell in everything} for wanted in groups(report))
+    found = _fitting([everything, *some], room, Path.read_bytes, _base64_length)
+    return found, {**_numbers(report, found), "note": _note(report, len(found), len(everything))}
 
 
-def _numbers(report: Report, found: Pictures) -> Json:
-    results, number = report.results, found.numbers.get
+def _numbers(report: Report, found: Iterable[Cell]) -> Json:
+    results, number = report.results, {cell: index for index, cell in enumerate(found)}.get
     displays = _pictured(results, [*results.conditions, *results.changed])
-    targets, held = results.targets, Counter(target for *_, target in found.numbers)
+    targets, held = results.targets, Counter(target for *_, target in found)
     return {
         "targets": {name: [number(("", results.reference(name), target)) for target in targets] for name in displays},
         "cells": {
@@ -115,7 +108,8 @@ def groups(report: Report) -> Iterator[list[Cell]]:
 
 def _truths(report: Report, target: str) -> list[Cell]:
     """The pictures of a target: one, or one for each of those displays that show it differently."""
-    return [("", reference, target) for reference in report.results.by_reference]
+    pictured = _pictured(report.results, report.results.conditions)
+    return [("", reference, target) for reference in dict.fromkeys(map(report.results.reference, pictured))]
 
 
 def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]:
@@ -160,13 +154,12 @@ def keep_copies(report: Report) -> None:
     is_ours = not folder.exists() or ((folder / MARK).is_file() and (folder / MARK).read_bytes() == SAYS)
     if not report.thumbnails.store.folder.is_dir() or not is_ours:
         return
-    known, kept, room = files(report, planned(report)), dict[str, bytes](), MOST_BYTES
+    known = files(report, planned(report))
     by_target = ([cell for cell in known if cell[2] == target] for target in report.results.targets)
-    for group in [*groups(report), *by_target]:
-        paths = {path.stem: path for cell in group if (path := known.get(cell)) and path.stem not in kept}
-        new = {stem: content for stem, path in paths.items() if (content := _encoded(path))}
-        if (size := sum(map(len, new.values()))) <= room:
-            kept, room = kept | new, room - size
+    wanted = (
+        {known[cell].stem: known[cell] for cell in group if cell in known} for group in [*groups(report), *by_target]
+    )
+    kept = {stem: content for stem, content in _fitting(wanted, MOST_BYTES, _encoded).items() if content}
     if kept:
         write_atomically(folder / MARK, SAYS)
     for old in folder.glob("*.webp"):

@@ -6,18 +6,7 @@ from importlib import import_module
 
 from ..section import Section
 
-NAMES = (
-    "answer",
-    "overview",
-    "setup",
-    "sweeps",
-    "ranks",
-    "focus",
-    "training",
-    "diagnosis",
-    "tests",
-    "alignment",
-)
+NAMES = ("answer", "overview", "setup", "sweeps", "ranks", "focus", "training", "diagnosis", "tests", "alignment")
 
 
 def sections() -> list[Section]:

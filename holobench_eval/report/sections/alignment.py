@@ -14,7 +14,7 @@ from ..data.results import Results
 from ..data.scores import Score, parse
 from ..data.tables import DONE
 from ..data.text import FILES
-from ..markdown import Markdown, bullets, heading, table
+from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 AGREE = 0.2  # dB of the headline PSNR by which two aligners may differ before the report warns
@@ -64,38 +64,19 @@ def sentences(results: Results, records: Records) -> list[str]:
     return [*lines, *filter(None, [agreement(results)])]
 
 
-def _captures_table(results: Results, records: Records) -> Markdown:
+def _captures_table(results: Results, records: Records) -> Markdown | None:
     """Each capture's alignment, and the headline metric by another algorithm's."""
     score, in_part = _doubled(results), any("share_seen" in record["scores"] for record in records)
     rows = []
     for record in _captures(records):
         geometry, scores = record["cell"]["geometry"], record["scores"]
-        turn, mirrored, scale = _pose(geometry)
-        rows.append(
-            [
-                record["label"],
-                record["cell"]["target"],
-                geometry["kind"],
-                *(
-                    [f"{geometry['correlation']:.3f}", f"{scale:.3f}", f"{turn:.1f}", "yes" if mirrored else "no"]
-                    if geometry["kind"] != "none"
-                    else [UNKNOWN] * 4
-                ),
-                *(_pair(scores, score) if score else []),
-                *([_percent(scores, "share_seen"), _percent(scores, "share_scored")] if in_part else []),
-            ]
-        )
-    columns = [
-        "method",
-        "target",
-        "alignment",
-        "correlation",
-        "capture pixels a target pixel",
-        "turn [deg]",
-        "mirrored",
-    ]
-    second = [score.axis, "by the second aligner", "difference", "apart [target px]"] if score else []
-    return table([*columns, *second, *(["seen [%]", "scored [%]"] if in_part else [])], rows)
+        row = {"method": record["label"], "target": record["cell"]["target"], "alignment": geometry["kind"]}
+        row |= _pose(geometry)
+        row |= _pair(scores, score) if score else {}
+        if in_part:
+            row |= {"seen [%]": _percent(scores, "share_seen"), "scored [%]": _percent(scores, "share_scored")}
+        rows.append(row)
+    return table_of(rows)
 
 
 def _percent(scores: Mapping[str, float], key: str) -> str:
@@ -145,40 +126,38 @@ def agreement(results: Results) -> str:
     )
 
 
-def _pair(scores: Mapping[str, float], score: Score) -> list[str]:
+def _pair(scores: Mapping[str, float], score: Score) -> dict[str, str]:
     """The score by both aligners, its difference, and how far apart they put a corner."""
     first, second = (scores.get(key, np.nan) for key in (score.key, f"{score.key}_second"))
     apart = scores.get("second_aligner_px", np.nan)
-    return [
-        score.number(first),
-        score.number(second),
-        score.number(second - first, signed=True),
-        UNKNOWN if np.isnan(apart) else f"{apart:.2f}",
-    ]
+    return {
+        score.axis: score.number(first),
+        "by the second aligner": score.number(second),
+        "difference": score.number(second - first, signed=True),
+        "apart [target px]": UNKNOWN if np.isnan(apart) else f"{apart:.2f}",
+    }
 
 
-def _pose(geometry: Mapping[str, Any]) -> tuple[float, bool, float]:
-    """Turn [degrees], mirror and scale of a target in its capture, at the target's upper left corner."""
+def _pose(geometry: Mapping[str, Any]) -> dict[str, str]:
+    """Correlation, scale, turn and mirror of a target in its capture, at the target's upper left corner."""
+    columns = ("correlation", "capture pixels a target pixel", "turn [deg]", "mirrored")
     if geometry["kind"] == "none":
-        return np.nan, False, np.nan
+        return dict.fromkeys(columns, UNKNOWN)
     h = np.array(geometry["homography"])
     linear = (h[:2, :2] - np.outer(h[:2, 2], h[2, :2]) / h[2, 2]) / h[2, 2]
-    mirrored = bool(np.linalg.det(linear) < 0)
-    down = linear[:, 1]  # a mirror from left to right leaves it
-    return float(np.degrees(np.arctan2(-down[0], down[1]))), mirrored, float(np.sqrt(abs(np.linalg.det(linear))))
+    area, down = np.linalg.det(linear), linear[:, 1]  # a mirror from left to right leaves the latter
+    turn, mirrored = np.degrees(np.arctan2(-down[0], down[1])), "yes" if area < 0 else "no"
+    values = (f"{geometry['correlation']:.3f}", f"{np.sqrt(abs(area)):.3f}", f"{turn:.1f}", mirrored)
+    return dict(zip(columns, values, strict=True))
 
 
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Pictures of the captures that are least like their targets; they were drawn when these were scored."""
-    found = {
-        (record["label"], record["cell"]["target"]): record["cell"]["geometry"].get("correlation", np.nan)
-        for record in _captures(report.records)
-    }
-    done = report.results.frame[report.results.frame["state"] == DONE]
+    done = [(each["label"], each["cell"]) for each in _captures(report.records) if each["state"] == DONE]
     drawn = [
-        (found[method, target], path, method, target)
-        for method, target in zip(done["label"], done["target"], strict=True)
-        if (path := report.figures / alignment_name(method, target)).is_file()
+        (cell["geometry"].get("correlation", np.nan), path, label, cell["target"])
+        for label, cell in done
+        if (path := report.figures / alignment_name(label, cell["target"])).is_file()
     ]
     drawn.sort(key=lambda one: one[0])
     more = (

@@ -13,7 +13,7 @@ from ...core.errors import listed
 from ...display.estimates import QUANTITIES
 from ..data.over_displays import is_many
 from ..data.trainings import Training
-from ..markdown import Markdown, bullets, heading, table
+from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 COLOURS = ("red", "green", "blue")
@@ -41,7 +41,7 @@ def _render(report: Report, _: Figures) -> Blocks:
         yield bullets(lacking)
 
 
-def diagnoses(trainings: Sequence[Training]) -> list[tuple[str, Markdown, str]]:
+def diagnoses(trainings: Sequence[Training]) -> list[tuple[str, Markdown | None, str]]:
     """Of every training with estimates: whose and of which display, the table, and a sentence on the errors."""
     return [
         (
@@ -85,7 +85,7 @@ def _known(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST  # not for NaN
 
 
-def quantities(rows: Sequence[Row]) -> Markdown:
+def quantities(rows: Sequence[Row]) -> Markdown | None:
     """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth."""
     colours = sorted({row["colour"] for row in rows if isinstance(row.get("colour"), int)})
     if colours == [0]:  # of the only laser
@@ -99,23 +99,15 @@ def quantities(rows: Sequence[Row]) -> Markdown:
         words = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
         off = [abs(difference(row)) for row in same.values() if _known(row.get("truth")) and row.get("seen", True)]
         stated = f"{first['error']:.2g}" if _known(first.get("error")) else "–"
-        lines.append(
-            [
-                words,
-                first.get("unit") or "",
-                *(_cell(same[colour], told) if colour in same else "" for colour in columns),
-                f"{max(off):.3f}" if off else "–",
-                "not seen" if first.get("seen") is False else stated,
-            ]
-        )
-    heads = [_colour(colour) for colour in columns]
-    return table(["quantity", "unit", *heads, "largest difference", "stated error"], lines)
+        line = {"quantity": words, "unit": first.get("unit") or ""}
+        line |= {_colour(colour): _cell(same[colour], told) if colour in same else "" for colour in columns}
+        line["largest difference"] = f"{max(off):.3f}" if off else "–"
+        lines.append(line | {"stated error": "not seen" if first.get("seen") is False else stated})
+    return table_of(lines)
 
 
 def _colour(colour: int | None) -> str:
-    if colour is None:
-        return "all"
-    return COLOURS[colour] if 0 <= colour < len(COLOURS) else f"colour {colour}"
+    return "all" if colour is None else dict(enumerate(COLOURS)).get(colour, f"colour {colour}")
 
 
 def _cell(row: Row, told: bool) -> str:

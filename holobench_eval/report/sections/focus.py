@@ -9,7 +9,7 @@ from ..data.phrases import marked
 from ..data.results import Results
 from ..data.statistics import Array, Estimate, mean_interval
 from ..data.text import number
-from ..markdown import Markdown, heading, table
+from ..markdown import Markdown, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 
@@ -40,27 +40,18 @@ def planes(results: Results) -> list[float]:
     return sorted({plane for _, plane in results.layout.planes.values()})
 
 
-def by_plane(results: Results, condition: str) -> Markdown:
+def by_plane(results: Results, condition: str) -> Markdown | None:
     """Mean over scenes at every plane, and seconds."""
-    score, distances = results.headline, planes(results)
-    focus = results.layout.measure == "focus"
-    each = [f"{plane:g} mm" if focus else f"{plane:g}" for plane in distances]
-    columns = ["method", "hologram of", *each, "all planes" if focus else "all places"]
-    rows = []
+    score, rows = results.headline, []
+    unit, places = (" mm", "planes") if results.layout.measure == "focus" else ("", "places")
     for name in results.methods(condition):
         values = results.values(name, condition)
-        estimates = [_at(results, values, plane) for plane in distances]
-        rows.append(
-            [
-                marked(results, name, condition),
-                made_of(results, name),
-                *map(score.estimate, estimates),
-                score.number(float(np.mean(values))),
-                number(float(results.row(name, condition)["solving_s"])),
-                number(seconds(results, name, condition)),
-            ]
-        )
-    return table([*columns, "seconds a hologram", "seconds a scene"], rows)
+        row = {"method": marked(results, name, condition), "hologram of": made_of(results, name)}
+        row |= {f"{plane:g}{unit}": score.estimate(_at(results, values, plane)) for plane in planes(results)}
+        row |= {f"all {places}": score.number(float(np.mean(values)))}
+        row |= {"seconds a hologram": number(float(results.row(name, condition)["solving_s"]))}
+        rows.append(row | {"seconds a scene": number(seconds(results, name, condition))})
+    return table_of(rows)
 
 
 def _at(results: Results, values: Array, plane: float) -> Estimate:

@@ -10,16 +10,14 @@ import numpy as np
 from ..answers import budget, kind_of
 from ..answers.kind import subjects
 from ..charts import paired
-from ..charts.cost import draw_costs
+from ..charts.curves import draw_costs
 from ..charts.error_budget import draw_budgets
 from ..charts.family import draw_map
 from ..charts.look.methods import looks
-from ..charts.rows import Row, draw_rows
+from ..charts.tiles import Row, draw_rows
 from ..data import over_displays
 from ..data.board import board
-from ..data.display_map import display_map
 from ..data.error_budget import budgets
-from ..data.over_displays import is_many
 from ..data.results import Results
 from ..section import Blocks, Figures, Report, Section
 
@@ -60,7 +58,7 @@ def _paired(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
 def _map(report: Report) -> Iterator[tuple[Path, str]]:
     """Margins against what an error budget of the displays found, of the best methods and those of the question."""
     results = report.results
-    if found := display_map(results):
+    if found := over_displays.display_map(results):
         wanted = [*subjects(results), *(label for label in found.labels[1:] if label not in subjects(results))]
         looked, path = looks(results.names), report.figures / "quality-map.png"
         axis = f"difference to {results.layout.baseline} in {results.headline.axis}"
@@ -130,7 +128,7 @@ def _budgets(report: Report) -> Iterator[tuple[Path, str]]:
 
 def _spends(results: Results) -> bool:
     known = results.layout.spends_captures and not results.layout.predicts and "total_captures" in results.table
-    return known and not is_many(results) and bool((results.table["total_captures"] > 0).any())
+    return known and not over_displays.is_many(results) and bool((results.table["total_captures"] > 0).any())
 
 
 def _is_budget(report: Report) -> bool:
@@ -153,17 +151,11 @@ def _costs(report: Report) -> Iterator[tuple[Path, str]]:
 SECTIONS = (
     Section("overview", 3, _table, applies=_has_scores),
     Section(
-        "plot",
-        4,
-        applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget",
-        figures=_plot,
+        "plot", 4, applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget", figures=_plot
     ),
     Section("error budget", 5, figures=_budgets),
     Section(
-        "pictures",
-        6,
-        applies=_has_scores,
-        figures=lambda report: report.pictures(PICTURES, lambda: _pictures(report)),
+        "pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, lambda: _pictures(report))
     ),
     Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
     Section("stages", 90, figures=_stages, details=True),

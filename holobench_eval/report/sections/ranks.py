@@ -11,7 +11,7 @@ from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Pair, Ranks
 from ..data.statistics import CLEAR, mean_interval
 from ..data.text import percent, words
-from ..markdown import Markdown, bullets, heading, table
+from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 
@@ -39,26 +39,21 @@ def _render(report: Report, _: Figures) -> Blocks:
 def flips(ranks: Ranks) -> Markdown | None:
     """The pairs whose order is the other way in some draw, most often first; empty where there is none."""
     flipping = sorted((pair for pair in ranks.pairs if pair.flips), key=lambda pair: -pair.flips)
-    if not flipping:
-        return None
-    score = ranks.results.headline
-    columns = ["nominally better", "than", f"nominally by{score.brackets}", f"over draws by{score.brackets}"]
-    columns += ["other way in [% of draws]", "goes with"]
-    return table(columns, [_flip(ranks, pair) for pair in flipping])
+    return table_of([_flip(ranks, pair) for pair in flipping])
 
 
-def _flip(ranks: Ranks, pair: Pair) -> list[str]:
-    score, cause = ranks.results.headline, ranks.cause(pair)
-    return [
-        pair.first,
-        pair.second,
-        score.number(pair.nominal, signed=True),
-        score.estimate(mean_interval(pair.differences), signed=True),
-        percent(pair.flipped),
-        f"{cause.parameter} (rank correlation {cause.rho:+.2f}, R2 {cause.explained:.2f})"
-        if cause
-        else "nothing drawn",
-    ]
+def _flip(ranks: Ranks, pair: Pair) -> dict[str, str]:
+    score, cause, with_ = ranks.results.headline, ranks.cause(pair), "nothing drawn"
+    if cause:
+        with_ = f"{cause.parameter} (rank correlation {cause.rho:+.2f}, R2 {cause.explained:.2f})"
+    return {
+        "nominally better": pair.first,
+        "than": pair.second,
+        f"nominally by{score.brackets}": score.number(pair.nominal, signed=True),
+        f"over draws by{score.brackets}": score.estimate(mean_interval(pair.differences), signed=True),
+        "other way in [% of draws]": percent(pair.flipped),
+        "goes with": with_,
+    }
 
 
 def left_out(ranks: Ranks) -> list[str]:
@@ -97,8 +92,9 @@ def _ranges(ranks: Ranks) -> Markdown | None:
         limits = f"{parameter.low:.3g} to {parameter.high:.3g}"
         drawn = f"{min(values):.3g} to {max(values):.3g}"
         turn = "; a full turn" if name in CIRCULAR else ""
-        rows.append([parameter.words, parameter.unit or "–", limits, drawn, f"{parameter.source}{turn}"])
-    return table(["parameter", "unit", "range", "drawn", "source of the range"], rows) if rows else None
+        row = {"parameter": parameter.words, "unit": parameter.unit or "–", "range": limits, "drawn": drawn}
+        rows.append(row | {"source of the range": f"{parameter.source}{turn}"})
+    return table_of(rows)
 
 
 def draw(rankings: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
@@ -129,11 +125,6 @@ def _any(report: Report) -> bool:
 
 
 SECTIONS = (
-    Section(
-        "ranks, drawn",
-        47,
-        applies=_any,
-        figures=lambda report: draw(report.ranks, report.figures),
-    ),
+    Section("ranks, drawn", 47, applies=_any, figures=lambda report: draw(report.ranks, report.figures)),
     Section("rank stability", 60, _render, applies=_any, details=True),
 )

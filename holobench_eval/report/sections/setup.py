@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...study.plan import is_reference
-from ..data.categories import FLOOR
-from ..data.layout import TrainingSet
+from ..data.layout import FLOOR, TrainingSet
 from ..data.results import Results
 from ..data.text import FILES, plain
 from ..markdown import Markdown, blocks, bullets, code, code_block, heading, properties, table
@@ -50,9 +49,8 @@ def _on_displays(report: Report) -> list[tuple[str, str]]:
     layout, cells = report.layout, [record["cell"] for record in report.records]
     sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
     panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
-    predicted = [("measured", f"predictions of the captures of holograms by {layout.holograms}")]
     return [
-        *(predicted if layout.predicts else []),
+        *([("measured", f"predictions of the captures of holograms by {layout.holograms}")] * layout.predicts),
         _targets(report.results),
         ("dataset", "; ".join(sets)),
         *([("training images", _training_images(layout.training))] if layout.training else []),
@@ -127,16 +125,12 @@ def _methods(report: Report) -> Markdown:
     """Label, registered name and parameters of every method, in the order of the tables."""
     cells = {record["label"]: record["cell"] for record in report.records}
     planned = report.results.table["category"] != FLOOR
-    rows = [
-        [label, code(cells[label]["method"]), plain(cells[label]["params"]) + _limit(cells[label])]
-        for label in dict.fromkeys(report.results.table.loc[planned, "label"])
-    ]
+    rows = []
+    for label in dict.fromkeys(report.results.table.loc[planned, "label"]):
+        cell = cells[label]
+        limit = f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
+        rows.append([label, code(cell["method"]), f"{plain(cell['params'])}{limit}"])
     return table(["method", "registered as", "parameters"], rows)
-
-
-def _limit(cell: Mapping[str, Any]) -> str:
-    """The most captures that the display allows for a target, where the study limits them."""
-    return f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
 
 
 def _environment(report: Report, _: Figures) -> Blocks:

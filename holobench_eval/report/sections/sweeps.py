@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..charts.gallery import spread
-from ..charts.look.methods import looks
-from ..charts.rows import Row, draw_rows
-from ..charts.sweeps import Curve, Panel, draw_sweep
-from ..data.categories import OFFLINE, ONLINE
-from ..data.results import CONSTANT
+from ..charts.curves import draw_sweep
+from ..charts.tiles import Row, draw_rows, spread
+from ..data.layout import OFFLINE, ONLINE
 from ..data.sweeps import Sweep
 from ..section import Report, Section
 
@@ -31,7 +28,7 @@ def _curves(report: Report) -> Iterator[tuple[Path, str]]:
     for same in _by_kind(report):
         change, kind = same[0].kind.words, same[0].swept.kind
         path = report.figures / f"quality-sweep-{kind}.png"
-        draw_sweep(path, [_panel(sweep) for sweep in same], f"{results.headline.axis}{report.layout.text.axis}")
+        draw_sweep(path, same, f"{results.headline.axis}{report.layout.text.axis}")
         yield (
             path,
             f"{results.headline.axis} along a change: {change}. Mean over targets; bars, slightly offset: 95 % "
@@ -56,35 +53,6 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
                 path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets(sweep.swept.before)[target]), rows
             )
             yield path, f"Captures of {target} on {sweep.swept.before} along a change: {change}."
-
-
-def _panel(sweep: Sweep) -> Panel:
-    kind, points = sweep.kind, sweep.points
-    results, looked, curves = sweep.results, looks(sweep.results.names), []
-    for label in sweep.methods:
-        means = tuple(sweep.mean(label, condition).mean for _, condition in points)
-        reaches = tuple(_reach(sweep, label, condition) for _, condition in points)
-        curves.append(Curve(label, means, reaches, looked[label], dashed=label == results.layout.baseline))
-    before = sweep.swept.before
-    has_floor = CONSTANT in results.floors and results.has_pictures(before)
-    return Panel(
-        title=before,
-        axis=f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}",
-        positions=tuple(float(value) if kind.numeric else float(index) for index, (value, _) in enumerate(points)),
-        curves=tuple(curves),
-        ticks=None if kind.numeric else tuple(sweep.text(value) for value, _ in points),
-        nominal=kind.nominal,
-        floor=float(results.row(CONSTANT, results.reference(before))[results.headline.column]) if has_floor else None,
-    )
-
-
-def _reach(sweep: Sweep, label: str, condition: str) -> tuple[float, float]:
-    """How far the interval of the mean difference to the unchanged display reaches down and up."""
-    loss = sweep.loss(label, condition) if condition != sweep.swept.before else None
-    if loss is None:
-        return 0.0, 0.0
-    ends = loss.high - loss.mean, loss.mean - loss.low
-    return ends if sweep.results.headline.higher_is_better else (ends[1], ends[0])
 
 
 def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:

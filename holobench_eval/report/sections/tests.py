@@ -9,7 +9,7 @@ import numpy as np
 from ..data.results import Results
 from ..data.statistics import FEWEST, POWER, SIGNIFICANCE, PairedTest
 from ..data.text import sample
-from ..markdown import Markdown, heading, table
+from ..markdown import Markdown, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 
@@ -32,51 +32,41 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
     yield _tests(results, tests)
 
 
-def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown:
+def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown | None:
     score, name = results.headline, results.layout.marked
-    rows = [
+    return table_of(
         [
-            f"{name(test.second)} – {name(test.first)}",
-            test.condition,
-            sample(test.estimate, len(results.targets)),
-            score.estimate(test.estimate, signed=True),
-            score.number(test.median, signed=True),
-            f"{test.better(score.sign)} of {test.estimate.n}",
-            score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
-            "no test" if np.isnan(test.p) else f"{test.p:.4f}",
-            "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
+            {
+                "comparison": f"{name(test.second)} – {name(test.first)}",
+                "display": test.condition,
+                "complete pairs": sample(test.estimate, len(results.targets)),
+                f"mean difference{score.brackets}": score.estimate(test.estimate, signed=True),
+                f"median{score.brackets}": score.number(test.median, signed=True),
+                "better on": f"{test.better(score.sign)} of {test.estimate.n}",
+                f"could show{score.brackets}": score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
+                "p": "no test" if np.isnan(test.p) else f"{test.p:.4f}",
+                "difference": "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
+            }
+            for test in tests
         ]
-        for test in tests
-    ]
-    columns = [
-        f"mean difference{score.brackets}",
-        f"median{score.brackets}",
-        "better on",
-        f"could show{score.brackets}",
-        "p",
-        "difference",
-    ]
-    return table(["comparison", "display", "complete pairs", *columns], rows)
+    )
 
 
 def _holes(report: Report, _: Figures) -> Blocks:
     """Every cell without a score, with its reason."""
-    columns = ["label", "condition", "target", "repeat", "state", "reason"]
-    rows = [
-        [method, condition, target, f"{repeat:.0f}", state, reason or "no reason given"]
-        for method, condition, target, repeat, state, reason in report.results.holes[columns].itertuples(index=False)
-    ]
+    holes = report.results.holes[["label", "condition", "target", "repeat", "state", "reason"]]
+    rows = holes.rename(columns={"label": "method", "condition": "display"}).to_dict("records")
     yield heading("Holes")
     if rows:
         yield (
             "Cells without a score. They enter no mean, and a method without a score for every target is not ranked."
         )
-        yield table(["method", "display", "target", "repeat", "state", "reason"], rows)
-    else:
-        yield "None: every planned cell has a score."
+    yield (
+        table_of(
+            [row | {"repeat": f"{row['repeat']:.0f}", "reason": row["reason"] or "no reason given"} for row in rows]
+        )
+        or "None: every planned cell has a score."
+    )
 
 
-SECTIONS = (
-    Section("paired tests", 120, _paired_tests, details=True),
-    Section("holes", 190, _holes, details=True),
-)
+SECTIONS = (Section("paired tests", 120, _paired_tests, details=True), Section("holes", 190, _holes, details=True))

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ..charts.training import draw_trainings
+from ..charts.curves import draw_trainings
 from ..data.layout import Layout
 from ..data.text import number, words
 from ..data.trainings import DISPLAY, Training
-from ..markdown import Markdown, bullets, heading, table
+from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
 
 DIGITS = 10  # of a sha256 that are printed
@@ -35,48 +35,43 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield from figures
 
 
-def _summary(layout: Layout, trainings: Sequence[Training]) -> Markdown:
+def _summary(layout: Layout, trainings: Sequence[Training]) -> Markdown | None:
     """What each training took."""
     given, features = layout.training, any(training.text("perceptual") for training in trainings)
     images, held_out = (given.images - given.held_out, given.held_out) if given else ("–", "–")
-    rows = [
+    return table_of(
         [
-            training.name,
-            training.display,
-            number(training.number("captures")),
-            number(training.number("seconds")),
-            images,
-            held_out,
-            (len(training.record.rounds) or "–") if training.record else "–",
-            *([training.text("perceptual") or "none"] if features else []),
-            training.text("sha256")[:DIGITS] or "not trained",
+            {
+                "method": training.name,
+                "trained on": training.display,
+                "captures": number(training.number("captures")),
+                "seconds": number(training.number("seconds")),
+                "images": images,
+                "held out": held_out,
+                "rounds": (len(training.record.rounds) or "–") if training.record else "–",
+                **({"perceptual features": training.text("perceptual") or "none"} if features else {}),
+                "learned state, sha256": training.text("sha256")[:DIGITS] or "not trained",
+            }
+            for training in trainings
         ]
-        for training in trainings
-    ]
-    columns = ["method", "trained on", "captures", "seconds", "images", "held out", "rounds"]
-    return table([*columns, *(["perceptual features"] if features else []), "learned state, sha256"], rows)
+    )
 
 
 def _rounds(trainings: Sequence[Training]) -> Markdown | None:
     """Every round of every training on held-out images; none where no method logged any."""
-
-    def decibel(value: float) -> str:
-        return "–" if math.isnan(value) else f"{value:.2f}"
-
-    rows = [
-        [
-            training.name,
-            step.number,
-            number(step.captures),
-            number(step.seconds),
-            *map(decibel, (step.predicted, step.captured, step.fidelity)),
-        ]
-        for training in trainings
-        for step in (training.record.rounds if training.record else ())
-        if not all(map(math.isnan, (step.predicted, step.captured, step.fidelity)))
-    ]
-    figures = ("PSNR, predicted [dB]", "PSNR, captured [dB]", "fidelity [dB]")
-    return table(["method", "round", "captures so far", "seconds so far", *figures], rows) if rows else None
+    rows = []
+    for training in trainings:
+        for step in training.record.rounds if training.record else ():
+            figures = {
+                "PSNR, predicted [dB]": step.predicted,
+                "PSNR, captured [dB]": step.captured,
+                "fidelity [dB]": step.fidelity,
+            }
+            if not all(map(math.isnan, figures.values())):
+                row = {"method": training.name, "round": step.number}
+                row |= {"captures so far": number(step.captures), "seconds so far": number(step.seconds)}
+                rows.append(row | {name: "–" if math.isnan(db) else f"{db:.2f}" for name, db in figures.items()})
+    return table_of(rows)
 
 
 def _doubts(trainings: Sequence[Training]) -> list[str]:

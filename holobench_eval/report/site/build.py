@@ -14,9 +14,8 @@ from typing import Any
 from ...core.errors import StorageError, UserError
 from ...core.io import TEMPORARY, write_atomically
 from ..page.html import asset
-from .checks import folded
 from .html import page, slug
-from .intake import Source, folders, read
+from .intake import Source, folded, folders, read
 from .pages import about, cards, places, studies
 from .pictures import Picture
 

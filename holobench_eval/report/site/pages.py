@@ -19,7 +19,7 @@ from ..answers.comparison import of_display
 from ..data import board as boards
 from ..data.phrases import verdict
 from ..data.statistics import Estimate
-from ..data.text import number
+from ..data.text import grouped, number
 from .html import slug
 from .intake import Source, text_of
 from .pictures import STAGES, Picture, figures, thumbnails
@@ -115,8 +115,7 @@ def _shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
         "left": min(ends),  # of the drawings
         "width": max(ends) - min(ends) or 1.0,
         "groups": [
-            {"name": boards.GROUPS[group], "rows": [_row(study, whole, row) for row in rows]}
-            for group, rows in display.groups
+            {"name": boards.GROUPS[group], "rows": [_row(whole, row) for row in rows]} for group, rows in display.groups
         ],
         "pictures": answers if display.name == results.conditions[0] else [],
         "sheets": [picture for picture in study.sheets if picture.of == f"{STAGES}{display.name}"],
@@ -148,22 +147,20 @@ def _drawn(row: boards.Row) -> Estimate | None:
     return row.test.estimate if row.test and math.isfinite(row.test.estimate.low) else None
 
 
-def _row(study: Study, whole: boards.Board, row: boards.Row) -> dict[str, Any]:
-    results, test = study.source.results, row.test
-    score, total = results.headline, len(results.targets)
-    lacks = [f"{row.scored} of {total} targets"] if row.scored < total else []
+def _row(whole: boards.Board, row: boards.Row) -> dict[str, Any]:
+    results, score, test = whole.results, whole.results.headline, row.test
     found = verdict(score, test) if test else ""
     return {
         "tier": row.tier,
         "method": results.names[row.label],
-        "name": ", ".join([row.label, *row.marks, *lacks]),
+        "name": ", ".join([row.label, *whole.marks(row)]),
         "score": score.number(row.score.mean),
         "difference": score.estimate(test.estimate, signed=True) if test else "",
         "verdict": found if found in ("better", "worse") else "same",
         "drawn": _drawn(row),
         "beside": [each.number(value) for each, value in zip(whole.beside, row.beside, strict=True)],
-        "photographs": number(math.nan if row.photographs is None else row.photographs),
-        "seconds": number(math.nan if row.seconds is None else row.seconds),
+        "photographs": number(row.photographs),
+        "seconds": number(row.seconds),
     }
 
 
@@ -189,8 +186,5 @@ def about(method: str) -> str:
 
 def cards(found: Sequence[Study]) -> dict[str, list[Shown]]:
     """The boards that enter, by the title of their display, own ones first."""
-    shown: dict[str, list[Shown]] = {}
-    for study in sorted(found, key=lambda study: bool(study.source.by)):
-        for each in study.boards if study.enters else ():
-            shown.setdefault(each["title"], []).append(each)
-    return shown
+    entering = sorted((study for study in found if study.enters), key=lambda study: bool(study.source.by))
+    return grouped((str(each["title"]), each) for study in entering for each in study.boards)

@@ -14,7 +14,7 @@ from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import UserError
 from ..data.tables import DONE
-from ..markdown import FIGURE
+from ..markdown import FIGURE, TEXTS
 from ..page.html import plain
 from .html import slug
 from .intake import MOST_FILE, Source, text_of
@@ -72,7 +72,7 @@ def figures(source: Source, study: str) -> tuple[list[Picture], list[Picture], i
     files = list(_files(source.folder / FIGURES))
     charts = [path for path in files if not path.name.startswith(STAGES)]
     sheets = [path for path in files if path.name in {f"{STAGES}{name}.png" for name in source.results.conditions}]
-    texts = "\n".join(text_of(source.folder / name) for name in ("report.md", "details.md"))
+    texts = "\n".join(text_of(source.folder / name) for name in TEXTS)
     captions = {name: plain(caption) for name, caption in FIGURE.findall(texts)}
     taken, room = list[Path](), ROOM
     for path in dict.fromkeys(path for pattern in ORDER for path in charts if path.match(pattern)):

@@ -50,13 +50,13 @@ def test_every_method_has_a_row_with_its_mark_number_and_dots_and_the_best_stand
 
 
 def test_the_line_at_zero_is_the_baseline_and_a_constant_image_has_one(found, tmp_path, monkeypatch, drawn):
-    monkeypatch.setattr(Results, "above_floor", lambda self, *_: self.gain("oracle", "leto-aged"))
+    monkeypatch.setattr(Results, "floor", lambda self, _: self.values("oracle", "leto-aged").mean())
     paired.draw(found, "leto-aged", tmp_path / "x.png")
     handles, labels = drawn[0].axes[0].get_legend_handles_labels()
     places = [float(line.get_xdata()[0]) for line in handles]
-    assert places == pytest.approx([0, -found.gain("oracle", "leto-aged").mean])
+    assert places == pytest.approx([0, found.gain("oracle", "leto-aged").mean])
     assert labels[0] == "baseline: wirtinger"
-    assert "constant image, -" in labels[1]
+    assert "constant image, +" in labels[1]
 
 
 def test_a_hole_is_counted_in_the_name_of_its_row(drawn, tmp_path):

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.report.compare.page import csv, markdown
-from holobench_eval.report.compare.paired import Comparison, compare
-from holobench_eval.report.compare.runs import read_run
+from holobench_eval.report.compare.paired import Comparison, compare, read_run
 from tests.support.records_on_disk import write_report
 
 A, B = [20.0, 21.0, 22.0], [20.5, 21.4, 22.6]

@@ -12,12 +12,9 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.studies import compute
 from tests.support.fake_study import write_config
+from tests.support.reports import files
 
 pytestmark = pytest.mark.usefixtures("no_physics")
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_report_from_records_csv_has_the_same_bytes_and_keeps_its_pictures(tmp_path: Path) -> None:

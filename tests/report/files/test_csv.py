@@ -12,9 +12,9 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report import Results, csv_text, layout_of, read_records, records_frame
-from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.data.layout import Swept
 from holobench_eval.report.data.tables import of_study
+from holobench_eval.report.files.tests_csv import comparison_frame
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE
 from tests.report.sections import test_sweeps as swept_study

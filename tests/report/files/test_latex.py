@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.data.comparisons import comparison_frame
 from holobench_eval.report.files.latex import escape, latex_tables
+from holobench_eval.report.files.tests_csv import comparison_frame
 from tests.support import synthetic_study as synthetic
 from tests.support.budget_study import ROWS, TARGETS, layout, study
 

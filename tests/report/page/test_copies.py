@@ -42,11 +42,11 @@ def copies(report: Report) -> dict[str, bytes]:
 
 
 def test_a_clone_shows_the_pictures_of_the_run_and_keeps_them(report: Report) -> None:
-    shown = pictures(report, 10**9)[0].numbers
+    shown = pictures(report, 10**9)[0]
     tile = report.thumbnails.tile("HIL", "ideal", "chelsea")
     keep_copies(report)
     clone = again(report)
-    assert pictures(clone, 10**9)[0].numbers.keys() == shown.keys()
+    assert pictures(clone, 10**9)[0].keys() == shown.keys()
     copied = clone.thumbnails.tile("HIL", "ideal", "chelsea")
     assert copied.note == tile.note
     assert tile.picture is not None
@@ -70,7 +70,7 @@ def test_without_room_whole_targets_are_kept_and_nothing_of_an_earlier_run(
     assert sum(map(len, kept.values())) <= room
     assert kept.items() < everything.items()
     clone = again(report)
-    assert {target for *_, target in pictures(clone, 10**9)[0].numbers} <= set(clone.thumbnails.targets("ideal"))
+    assert {target for *_, target in pictures(clone, 10**9)[0]} <= set(clone.thumbnails.targets("ideal"))
 
 
 def test_a_folder_of_somebody_else_stays_as_it_is(report: Report) -> None:

@@ -32,7 +32,7 @@ def held(report: Report, room: int) -> dict[str, set[tuple[str, str]]]:
     """By target, the (method, condition) whose captures a page with so much room has; of the target ("", REFERENCE)."""
     found, _ = pictures(report, room)
     return {
-        target: {(label, condition) for label, condition, name in found.numbers if name == target}
+        target: {(label, condition) for label, condition, name in found if name == target}
         for target in report.results.targets
     }
 
@@ -44,7 +44,7 @@ def size(contents: Iterable[bytes]) -> int:
 @pytest.fixture(scope="module")
 def whole(report: Report) -> int:
     """The room that all pictures take."""
-    return size(pictures(report, 10**9)[0].contents)
+    return size(pictures(report, 10**9)[0].values())
 
 
 def test_the_page_holds_the_bytes_of_the_records(written: Written) -> None:
@@ -85,14 +85,14 @@ def test_no_page_takes_more_room_than_it_has_or_lacks_a_target_and_the_note_coun
 ) -> None:
     room, count = int(share * whole), 6 + 6 * 12 - 1
     found, shown = pictures(report, room)
-    assert size(found.contents) <= room
-    assert (len(found.contents) == count) == (share == 1)
-    assert f"holds {'all' if share == 1 else f'{len(found.contents)} of'} {count} pictures" in shown["note"]
+    assert size(found.values()) <= room
+    assert (len(found) == count) == (share == 1)
+    assert f"holds {'all' if share == 1 else f'{len(found)} of'} {count} pictures" in shown["note"]
     for cells in held(report, room).values():
         assert not cells or ("", REFERENCE) in cells
 
 
 def test_a_study_without_thumbnails_says_so(report: Report, tmp_path: Path) -> None:
     found, shown = pictures(Report(report.results, report.records, tmp_path, {}, Description()), 10**6)
-    assert not found.contents
+    assert not found
     assert "no pictures" in shown["note"]

@@ -31,10 +31,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("front")
     records = synthetic.study(folder, targets=TARGETS)
     layout = synthetic.layout(
-        targets=TARGETS,
-        question=EVIL,
-        would_change="Another sign.",
-        tuned={"HIL": "the rates were chosen elsewhere"},
+        targets=TARGETS, question=EVIL, would_change="Another sign.", tuned={"HIL": "the rates were chosen elsewhere"}
     )
     return write_report(layout, records, folder, {}, DESCRIPTION)[0].read_text()
 

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from holobench_eval.report import Description, Results
-from holobench_eval.report.charts.thumbnails import noted
+from holobench_eval.report.charts.tiles import noted
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.section import Report
 from holobench_eval.report.sections.focus import SECTIONS, by_plane

@@ -8,7 +8,7 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.report import Results, records_frame, table_from_records, write_report
 from holobench_eval.report.answers import kind_of
 from holobench_eval.report.answers.limits import limits
-from holobench_eval.report.charts.training import MOST, draw_trainings
+from holobench_eval.report.charts.curves import MOST, draw_trainings
 from holobench_eval.report.data.layout import TrainingSet
 from holobench_eval.report.description import Description
 from holobench_eval.report.markdown import blocks

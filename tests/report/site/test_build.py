@@ -9,13 +9,10 @@ import pytest
 
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.report.site import build, write_site
+from tests.support.reports import files
 from tests.support.results_folder import write_results
 
 OWN = Path("reports")
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report.site import checks, pictures, write_site
+from holobench_eval.report.site import intake, pictures, write_site
 from holobench_eval.report.site.intake import read
 from tests.support.results_folder import edited, write_results
 
@@ -174,11 +174,6 @@ def escaping(folder: Path) -> None:
     (folder / "thumbnails" / outside.name).symlink_to(outside)
 
 
-def elsewhere(folder: Path) -> None:
-    (folder / "thumbnails").rename(folder.parent / "thumbnails")
-    (folder / "thumbnails").symlink_to(folder.parent / "thumbnails")
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -190,7 +185,7 @@ def elsewhere(folder: Path) -> None:
         (lambda folder: (folder / "thumbnails" / "a").mkdir(), ("a: a link or a folder",)),
         (lambda folder: picture(folder).rename(folder / "thumbnails" / "a.png"), ("a.png: no such cell",)),
         (escaping, ("outside.png: a link",)),
-        (elsewhere, ("thumbnails: not a folder of its own",)),
+        (linked("thumbnails"), ("thumbnails: not a folder of its own",)),
         (lambda folder: Image.new("I;16", (8, 8)).save(picture(folder)), ("more than 8 bits a channel",)),
         (lambda folder: picture(folder).rename(folder / "thumbnails" / "a\nb.png"), ("'a\\nb.png'", "rename it")),
     ],
@@ -225,7 +220,7 @@ def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) 
 def test_a_folder_of_too_many_rows_or_labels_is_refused(
     handed_in: Path, monkeypatch: pytest.MonkeyPatch, limit: str, words: str
 ) -> None:
-    monkeypatch.setattr(checks, limit, 5)
+    monkeypatch.setattr(intake, limit, 5)
     refused(handed_in, words, "at most 5")
 
 

@@ -3,8 +3,8 @@
 A hue is a family of methods, a marker a method in it, a tint a variant of a method within a study. The hues were
 searched by chance for the largest smallest difference (CIEDE2000, Sharma, Wu & Dalal, Color Res. Appl. 30, 2005) to
 normal eyes, to deuteranopes and protanopes (simulated as in Machado, Oliveira & Fernandes, IEEE TVCG 15, 2009) and in
-gray; ``tests/report/charts/look`` measures them. No hue is used twice: a method that is not in the registry is gray,
-with a marker of its own as far as there are markers, and charts write its name beside it.
+gray; ``tests/report/charts/test_look.py`` measures them. No hue is used twice: a method that is not in the registry is
+gray, with a marker of its own as far as there are markers, and charts write its name beside it.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ def look(name: str, variant: int = 0, variants: int = 1) -> Look:
 
     variant, variants: which of how many rows of the method it is; later ones have paler faces.
     """
-    colour, marker = REGISTRY.get(name) or (NEUTRAL, _marker(name.rpartition(":")[2]))
+    chance = hashlib.sha256(name.rpartition(":")[2].encode()).digest()[0]  # depends on the name alone
+    colour, marker = REGISTRY.get(name, (NEUTRAL, MARKERS[chance % len(MARKERS)]))
     if name == "oracle":
         return Look(colour, marker, WHITE)
     pale = PALEST * variant / (variants - 1) if variants > 1 else 0.0
@@ -96,11 +97,6 @@ def _paler(colour: str, white: float) -> str:
     """A colour mixed with a share of white."""
     red, green, blue = (share + white * (1 - share) for share in to_rgb(colour))
     return to_hex((red, green, blue)).upper()
-
-
-def _marker(name: str) -> str:
-    """A marker that depends on the name alone."""
-    return MARKERS[hashlib.sha256(name.encode()).digest()[0] % len(MARKERS)]
 
 
 def looks(names: Mapping[str, str]) -> dict[str, Look]:

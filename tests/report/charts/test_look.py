@@ -1,4 +1,4 @@
-"""Colours as people see them: CIEDE2000 between the hues, to normal and colour-blind eyes and in gray."""
+"""Colours as people see them, by CIEDE2000 between the hues, to normal and colour-blind eyes and in gray; and media."""
 
 import itertools
 
@@ -8,6 +8,7 @@ from matplotlib.colors import to_rgb
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from holobench_eval.core import plugins
+from holobench_eval.report.charts.look.medium import MEDIA, SCREEN, drawn_for, medium
 from holobench_eval.report.charts.look.methods import BLACK, HUES, NEUTRAL, REGISTRY, look, looks
 
 # Machado, Oliveira & Fernandes, IEEE TVCG 15 (2009), severity 1, on linear RGB.
@@ -74,3 +75,15 @@ def test_a_method_of_a_file_is_neutral_and_looks_the_same_wherever_the_file_lies
     assert look("mine.py:Mine") == look("some/folder/mine.py:Mine")
     assert look("mine.py:Mine").colour == NEUTRAL
     assert len({look(f"mine.py:Method{number}").marker for number in range(30)}) > 5
+
+
+def test_figures_are_drawn_for_the_screen_unless_another_medium_is_asked_for():
+    assert medium() is SCREEN
+    with pytest.raises(KeyError, match="a block of 685"), drawn_for(MEDIA["double"]):
+        raise KeyError(f"a block of {medium().width}")
+    assert medium() is SCREEN
+
+
+def test_words_are_wrapped_between_words_and_never_within():
+    lines = SCREEN.wrap("double_phase_with_a_long_name and more", 90).splitlines()
+    assert lines == ["double_phase_with_a_long_name", "and more"]

@@ -3,11 +3,20 @@ import pytest
 from matplotlib import colormaps
 from PIL import Image
 
-from holobench_eval.report.charts import gallery
-from holobench_eval.report.charts.comparison import draw_comparison
-from holobench_eval.report.charts.gallery import Column, Tile, error_limit, load_picture, most_detailed
-from holobench_eval.report.charts.rows import HEADER, SIDE, Row, draw_rows, tile_size
+from holobench_eval.report.charts import tiles
 from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
+from holobench_eval.report.charts.tiles import (
+    HEADER,
+    SIDE,
+    Row,
+    Tile,
+    draw_comparison,
+    draw_rows,
+    error_limit,
+    load_picture,
+    most_detailed,
+    tile_size,
+)
 from tests.support import synthetic_study as synthetic
 
 
@@ -35,7 +44,7 @@ def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_
 
 
 def test_targets_of_a_large_study_are_spread_from_first_to_last():
-    assert gallery.spread([str(n) for n in range(21)], 5) == ["0", "5", "10", "15", "20"]
+    assert tiles.spread([str(n) for n in range(21)], 5) == ["0", "5", "10", "15", "20"]
 
 
 def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(tmp_path):
@@ -72,13 +81,13 @@ def test_displays_keep_figures_of_their_own_whatever_they_are_called():
 
 def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(tmp_path):
     target, capture = noise(207), noise(207, seed=1)
-    draw_comparison(tmp_path / "page.png", "bench", [("noise", target)], [Column("method", (Tile(capture, "x"),))], 0.5)
+    draw_comparison(tmp_path / "page.png", "bench", target, [("method", Tile(capture, "x"))], 0.5)
     page, crop = load_picture(tmp_path / "page.png"), most_detailed(target)
     left, top, side = SIDE + 207 + 8, HEADER + 207 + 20, 4 * 23
     enlarged = crop.of(capture).repeat(4, axis=0).repeat(4, axis=1)
     assert np.abs(page[top : top + side, left : left + side] - enlarged).max() < 1 / 255
     drawn = page[top : top + side, left + 207 - side : left + 207]
-    colours = colormaps["magma"](np.minimum(gallery.error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
+    colours = colormaps["magma"](np.minimum(tiles.error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
     assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
 
 

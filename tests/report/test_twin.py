@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display.simulated.trust import Trust
-from holobench_eval.report.data.twin import Noise, Shown, Trial, further
+from holobench_eval.report.twin import Noise, Shown, Trial, further
 
 SHAPE = (3, 96, 128)
 LIKE = np.full((3, 4), 35.0)

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from skimage.io import imread
 
-from holobench_eval.report.charts import cost
+from holobench_eval.report.charts import curves
 from holobench_eval.report.charts.look.methods import looks
 from holobench_eval.report.charts.style import save
 from holobench_eval.report.data.board import board
@@ -26,8 +26,8 @@ def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(
         figures.append(figure)
         save(figure, path)
 
-    monkeypatch.setattr(cost, "save", noted)
-    cost.draw_costs(tmp_path / "x.png", displays, found.names, looks(found.names), "PSNR [dB]")
+    monkeypatch.setattr(curves, "save", noted)
+    curves.draw_costs(tmp_path / "x.png", displays, found.names, looks(found.names), "PSNR [dB]")
     assert imread(tmp_path / "x.png").shape[1] == 900  # as wide as any other
     for axes, display in zip(figures[0].axes, displays, strict=True):
         rows = [row for row in display.rows if row.label not in found.layout.privileged]

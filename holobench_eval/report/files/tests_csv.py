@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pandas as pd
 
-from .column import Column
-from .columns import tabled
-from .results import Results
-from .scores import Score
-from .statistics import POWER, PairedTest
+from ..data.column import Column
+from ..data.columns import tabled
+from ..data.results import Results
+from ..data.scores import Score
+from ..data.statistics import POWER, PairedTest
 
 _KEYS = ("study", "measure", "display", "condition", "method", "label")  # as in table.csv, of the tested row
 _MEANINGS = {"method": "Name of the tested method in configs", "label": "Name of its row in tables"}

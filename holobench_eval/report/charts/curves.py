@@ -1,0 +1,196 @@
+"""Quality as curves: against the photographs that it cost, along a change of the display, and while a method trains."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from ...study.artifacts import Round
+from ..data.board import Display, Row
+from ..data.layout import ORACLE
+from ..data.sweeps import Sweep
+from .look.medium import medium
+from .look.methods import Look, looks
+from .style import GREY, SHADES, grid, laid_out, legend_below, marks, save, stacked, style, without_math
+
+TICKS = (0, 5, *(step * 10**power for power in range(1, 7) for step in (1, 2, 5)))
+COSTS, SWEEP, LINE, FOOTER = 320, 330, 17, 10  # pixels of the screen: of a panel of either, of a name beside it
+Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
+Limits = tuple[tuple[float, float], tuple[float, float]]  # of captures, and of PSNR [dB]
+
+COLUMNS, A_PAGE, NARROWEST = 3, 6, 200  # of trainings: panels side by side and on a page, pixels of a panel
+MOST = 12  # trainings with a panel each; of more, the table alone is in the report
+LINES = (
+    ("predicted", "predicted picture, against the target", SHADES[0], "o"),
+    ("captured", "captured picture, against the target", SHADES[1], "s"),
+    ("fidelity", "prediction, against the capture (fidelity)", SHADES[2], "^"),
+)
+
+
+def draw_costs(
+    path: Path, displays: Sequence[Display], names: Mapping[str, str], looked: Mapping[str, Look], quality: str
+) -> None:
+    """Draw quality against photographs, a panel a display: a mark a row, a curve a method with several budgets.
+
+    names: the registered name of every label, whose rows are joined; looked: by label; quality: the headline with its
+    unit.
+    """
+    with style():
+        rows = [_rows(display) for display in displays]
+        heights = [max(COSTS, LINE * len(each) + 60) for each in rows]
+        figure, drawn = stacked([display.name for display in displays], heights, FOOTER)
+        for axes, each in zip(drawn, rows, strict=True):
+            _draw_costs(axes, each, names, looked)
+            _finish(axes, quality)
+        axes.set_xlabel("photographs in total, of training and of all targets")
+        save(figure, path)
+
+
+def draw_sweep(path: Path, sweeps: Sequence[Sweep], quality: str) -> None:
+    """Draw a change of displays, a panel a display: a curve a method, or dots where the change has no axis."""
+    with style():
+        figure, drawn = stacked([sweep.swept.before for sweep in sweeps], [SWEEP] * len(sweeps), FOOTER)
+        for axes, sweep in zip(drawn, sweeps, strict=True):
+            _draw_sweep(axes, sweep)
+            _finish(axes, quality)
+        save(figure, path)
+
+
+def _finish(axes: Axes, quality: str) -> None:
+    """The names of what is drawn, in rows to the right of the panel, and of the axis."""
+    axes.set_ylabel(quality.replace(", of ", "\nof "))
+    grid(axes)
+    without_math(axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=medium().note))
+
+
+def _rows(display: Display) -> list[Row]:
+    """Those with every target and a known number of photographs, without oracles."""
+    rows = [row for group, rows in display.groups for row in rows if group != ORACLE]
+    return [row for row in rows if row.photographs is not None and math.isfinite(row.score.mean) and row.scored]
+
+
+def _draw_costs(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looked: Mapping[str, Look]) -> None:
+    """Curves and marks; bars are the intervals of the differences to the baseline, moved to the means."""
+    for method in dict.fromkeys(names[row.label] for row in rows):
+        own = sorted((row for row in rows if names[row.label] == method), key=lambda row: row.photographs or 0.0)
+        if len({row.photographs for row in own}) == len(own) > 1:
+            points = [(row.photographs, row.score.mean) for row in own]
+            axes.plot(*zip(*points, strict=True), color=looked[own[0].label].colour, linewidth=1.4, zorder=2)
+        for row in own:
+            look, known = looked[row.label], row.test and math.isfinite(row.test.estimate.low)
+            axes.errorbar(
+                row.photographs or 0.0,
+                row.score.mean,
+                yerr=row.test.estimate.reach if row.test and known else None,
+                **marks(look, 6.5),
+                linestyle="none",
+                ecolor=look.colour,
+                capsize=2.5,
+                label=row.label,
+                zorder=3,
+            )
+    axes.set_xscale("symlog", linthresh=10)
+    most = max(row.photographs or 0.0 for row in rows)
+    axes.set_xticks([tick for tick in TICKS if tick <= most] or [0])
+    axes.set_xlim(right=1.4 * most)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+
+
+def _draw_sweep(axes: Axes, sweep: Sweep) -> None:
+    """Means, slightly apart from each other, with bars for their differences to the unchanged display."""
+    kind, results, points = sweep.kind, sweep.results, sweep.points
+    looked, better = looks(results.names), results.headline.sign
+    positions = np.array([float(value) if kind.numeric else index for index, (value, _) in enumerate(points)])
+    apart = np.ptp(positions) / 250 if kind.numeric else 0.07
+    for index, label in enumerate(sweep.methods):
+        losses = [sweep.loss(label, name) if name != sweep.swept.before else None for _, name in points]
+        axes.errorbar(
+            positions + (index - (len(sweep.methods) - 1) / 2) * apart,
+            [sweep.mean(label, name).mean for _, name in points],
+            yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in losses]),
+            color=looked[label].colour,
+            **marks(looked[label], 6.5),
+            linewidth=1.5 if kind.numeric else 0,
+            linestyle="--" if label == results.layout.baseline else "-",
+            elinewidth=0.8,
+            capsize=2,
+            label=label,
+        )
+    if (floor := results.floor(sweep.swept.before)) is not None:
+        axes.axhline(floor, color=GREY, linewidth=1.1, linestyle=(0, (3, 3)), zorder=1, label="a gray picture")
+    if kind.nominal is not None:
+        axes.axvline(kind.nominal, color="black", linewidth=0.8, linestyle=":")
+    if not kind.numeric:
+        axes.set_xticks(positions, [sweep.text(value) for value, _ in points], parse_math=False)
+    axes.set_xlabel(medium().wrap(f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}", 0.6 * medium().width))
+    axes.margins(x=0.03)
+
+
+def draw_trainings(stem: Path, trainings: Sequence[Rounds]) -> list[Path]:
+    """Draw the trainings that have several rounds, where they are few enough to be looked at; the files.
+
+    stem: the files' name without number and ending.
+    """
+    drawable = [(name, kept) for name, rounds in trainings if (kept := tuple(filter(_has_figures, rounds)))]
+    if len(drawable) > MOST or all(len(rounds) == 1 for _, rounds in drawable):
+        return []
+    drawn = []
+    for number, start in enumerate(range(0, len(drawable), A_PAGE), start=1):
+        drawn.append(stem.with_name(f"{stem.name}-{number}.png"))
+        _draw_page(drawn[-1], drawable[start : start + A_PAGE], _limits(drawable))
+    return drawn
+
+
+def _has_figures(step: Round) -> bool:
+    return math.isfinite(step.captures) and any(math.isfinite(getattr(step, name)) for name, *_ in LINES)
+
+
+def _limits(trainings: Sequence[Rounds]) -> Limits:
+    """The ranges of captures and of PSNR, one for all panels, so that they can be compared by eye."""
+    values = np.array([getattr(step, name) for _, rounds in trainings for step in rounds for name, *_ in LINES])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = max(0.5, 0.08 * (high - low))
+    most = max(step.captures for _, rounds in trainings for step in rounds)
+    return (0.0, most * 1.06 + 0.5), (low - margin, high + margin)
+
+
+def _draw_page(path: Path, trainings: Sequence[Rounds], limits: Limits) -> None:
+    """A panel per training: the three figures against the captures taken, a mark per round."""
+    columns = min(COLUMNS, len(trainings), medium().width // NARROWEST)
+    rows = -(-len(trainings) // columns)
+    with style():
+        height = round(medium().scale * (60 + 270 * rows))
+        figure, panels = laid_out(medium().width, height, rows, columns, sharey=True)
+        for index, axes in enumerate(panels.flat):
+            if index >= len(trainings):
+                axes.remove()
+                continue
+            name, steps = trainings[index]
+            _curve(axes, steps, limits)
+            title = textwrap.fill(
+                name,
+                medium().characters(0.85 * medium().width / columns),
+                max_lines=2,
+                placeholder="...",
+                break_on_hyphens=False,
+            )
+            axes.set_title(title, loc="left", weight="bold", parse_math=False)
+            if index % columns == 0:
+                axes.set_ylabel("PSNR on held-out images [dB]")
+        legend_below(figure, *panels[0, 0].get_legend_handles_labels())
+        save(figure, path)
+
+
+def _curve(axes: Axes, rounds: tuple[Round, ...], limits: Limits) -> None:
+    captures = [step.captures for step in rounds]
+    for key, label, colour, marker in LINES:
+        axes.plot(captures, [getattr(step, key) for step in rounds], color=colour, marker=marker, label=label)
+    axes.set(xlabel="captures taken for training", xlim=limits[0], ylim=limits[1])
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+    grid(axes)
