@@ -15,6 +15,7 @@ import torch
 from hypothesis import settings
 
 from holobench_eval.commands import run as run_command
+from holobench_eval.optics.transfer import kernel
 from holobench_eval.study.scoring import reference
 from tests.support import fake_study
 
@@ -25,6 +26,12 @@ torch.set_num_threads(1)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 SHEETS = run_command.sheets
 CACHES = count()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The kernel of a fresh clone is compiled once, before all processes of the tests would do so at the same time."""
+    if config.getoption("numprocesses", None):  # of the process that starts the others
+        kernel()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -138,7 +138,7 @@ class Starts:
         began, earlier = time.perf_counter(), len(self.before)
         phase = solve()
         cost = Cost(time.perf_counter() - began).after(known.cost for known in self.before[earlier:])
-        solved = Solution(phase.detach().cpu()[0], 0, cost, alone=False, covered=dict(self.covered))
+        solved = Solution(phase.detach().cpu()[0], 0, cost, alone=False, covered=dict(self.covered), shown=0)
         self.phases.keep(identity, solved)
         return phase
 

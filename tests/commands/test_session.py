@@ -59,6 +59,17 @@ def exported(tmp_path_factory):
     return folder, said
 
 
+@pytest.fixture(scope="module")
+def exported_in_green(tmp_path_factory):
+    """The session of one laser, for what is the same in every colour."""
+    folder = tmp_path_factory.mktemp("green")
+    profile = write_green(folder, "leto-mild")
+    (folder / "study.yaml").write_text(STUDY.replace("leto-mild", profile.name))
+    run("session", "export", folder / "study.yaml", folder / "bench")
+    Lab(str(profile), (144, 144), seed=1).photograph_round(folder / "bench", 1)
+    return folder
+
+
 @pytest.fixture
 def averaged(monkeypatch):
     """Captures of a direct run are scored by means over the target's pixels, as photographs are."""
@@ -106,13 +117,14 @@ def wrong(folder: Path, *more: object) -> str:
 
 
 @pytest.fixture
-def photographed(exported, tmp_path):
+def photographed(exported_in_green, tmp_path):
     """A copy of the session with its photographs, none of them read yet."""
-    shutil.copytree(exported[0] / "bench", tmp_path / "bench", ignore=shutil.ignore_patterns("report"))
-    manifest = json.loads((tmp_path / "bench" / "manifest.json").read_text())
-    manifest["photographed"] = None
-    (tmp_path / "bench" / "manifest.json").write_text(json.dumps(manifest))
-    return tmp_path / "bench"
+    return shutil.copytree(exported_in_green, tmp_path / "copy") / "bench"
+
+
+def own(folder: Path) -> tuple[object, ...]:
+    """The option that gives an import the user's config, whose display is a file."""
+    return "--study", folder.parent / "study.yaml"
 
 
 def captures(folder: Path, role: str) -> list[Path]:
@@ -155,7 +167,7 @@ def outside(path: Path) -> None:
 def test_a_photograph_that_cannot_be_is_named(photographed, role, spoil, line):
     path = captures(photographed, role)[0]
     spoil(path)
-    assert line.format(path.stem) in wrong(photographed)
+    assert line.format(path.stem) in wrong(photographed, *own(photographed))
 
 
 def test_a_stale_frame_and_a_copy_are_told_apart_whatever_their_time_stamps(photographed):
@@ -163,23 +175,23 @@ def test_a_stale_frame_and_a_copy_are_told_apart_whatever_their_time_stamps(phot
     note = PngInfo()
     note.add_text("time", "later")
     Image.open(first).save(second, pnginfo=note)
-    assert f"stale frame: captures/round-1/{second.stem} is captures/round-1/{first.stem} again" in wrong(photographed)
+    assert f"stale frame: captures/round-1/{second.stem} is captures/round-1/{first.stem} again" in wrong(
+        photographed, *own(photographed)
+    )
     shutil.copyfile(first, last)
-    assert f"duplicated: captures/round-1/{last.stem}" in wrong(photographed)
+    assert f"duplicated: captures/round-1/{last.stem}" in wrong(photographed, *own(photographed))
 
 
 def test_photographs_in_the_wrong_order_are_found_and_can_be_put_right(photographed):
-    manifest = json.loads((photographed / "manifest.json").read_text())
-    shown = [one for one in manifest["patterns"] if one["role"] == "hologram" and one["colour"] == 0]
-    pictures = [photographed / f"{one['capture']}.png" for one in shown]
-    for paths in ([captures(photographed, role)[0] for role in ("fiducial", "hologram")], pictures):
+    holograms = captures(photographed, "hologram")
+    for paths in ([captures(photographed, "fiducial")[0], holograms[0]], holograms):
         contents = [path.read_bytes() for path in paths]
         for path, content in zip(paths, contents[1:] + contents[:1], strict=True):
             path.write_bytes(content)
-        assert "wrong order: captures/round-1/" in wrong(photographed)
+        assert "wrong order: captures/round-1/" in wrong(photographed, *own(photographed))
         for path, content in zip(paths, contents, strict=True):
             path.write_bytes(content)
-    assert "table.csv" in run("session", "import", photographed)
+    assert "table.csv" in run("session", "import", photographed, *own(photographed))
 
 
 def test_bits_at_the_upper_end_are_told_and_dark_frames_without_any_count_are_dark(photographed):
@@ -187,7 +199,7 @@ def test_bits_at_the_upper_end_are_told_and_dark_frames_without_any_count_are_da
         save(path, np.maximum(counts(path).astype(np.int64) - 1000, 0).astype(np.uint16) & 0xFFF0)
     for path in captures(photographed, "dark"):
         save(path, np.zeros_like(counts(path)))
-    said = run("session", "import", photographed)
+    said = run("session", "import", photographed, *own(photographed))
     assert "12 bits at the upper end of 16" in said
     assert "12 bits at the upper end of 16" in (photographed / "report" / "report.md").read_text()
 
@@ -198,7 +210,7 @@ def test_jpeg_is_flagged_as_not_linear(photographed):
         encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
         cv2.imwrite(str(path.with_suffix(".jpg")), (encoded * 255).round().astype(np.uint8), [1, 100])
         path.unlink()
-    said = run("session", "import", photographed)
+    said = run("session", "import", photographed, *own(photographed))
     assert "not linear in light" in said
 
 

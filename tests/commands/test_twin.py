@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,9 @@ from holobench_eval.commands import main
 from holobench_eval.commands.twin import twin
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
+from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.twin import method
+from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.report.description import basis
 from holobench_eval.study.calibration import twin as twins
 from tests.study.studies import write_green
@@ -39,6 +42,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> 
 
     monkeypatch.setattr(twins, "study_text", text)
     monkeypatch.setattr(method, "OPEN_LOOP", SHORT_OPEN_LOOP)
+    monkeypatch.setattr(patterns, "Wirtinger", partial(Wirtinger, iterations=5))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

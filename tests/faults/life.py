@@ -70,7 +70,7 @@ class Mine:
 """
 
 STUDY = f"""title: faults
-display: {{profiles: [leto-mild], panel: [128, 160]}}
+display: {{profiles: [green.yaml], panel: [128, 160]}}
 targets: {{dataset: photographs, params: {{names: [{", ".join(TARGETS)}]}}}}
 training: {{dataset: dead_leaves, params: {{count: 4}}, held_out: 1}}
 protocol: {{metrics: [psnr]}}
@@ -87,8 +87,9 @@ methods:
       retrieval: {{iterations: 3}}
 """
 
+GREEN = "like: leto-mild\nname: green\npanel: {wavelengths: [5.17e-7]}\n"  # faults meet each colour alike
 
-SIMULATED = {"mine.py": METHOD, "study.yaml": STUDY}
+SIMULATED = {"mine.py": METHOD, "green.yaml": GREEN, "study.yaml": STUDY}
 PHOTOGRAPHING = SIMULATED | {"study.yaml": re.sub(r"  - double_phase\n.*wirtinger.*\n", "", STUDY)}
 DEVICES = {"mine.py": METHOD, **devices.FILES}
 

@@ -13,10 +13,10 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib import import_module
 from multiprocessing import forkserver
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -161,20 +161,8 @@ def dask(victim: int) -> Callable[..., Told]:
         known = folder / "scheduler.json"
         known.unlink(missing_ok=True)
         file = ["--scheduler-file", str(known), "--no-dashboard"]
-        commands = [
-            ["scheduler", "--port", "0", *file],
-            *[["worker", "--nthreads", "1", "--no-nanny", *file]] * WORKERS,
-        ]
-        cluster = [
-            subprocess.Popen(
-                [sys.executable, "-m", "distributed.cli.dask_" + command[0], *command[1:]],
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                cwd=folder,
-                env=os.environ | {"PYTHONPATH": str(ROOT)},  # for the cameras that count
-            )
-            for command in commands
-        ]
+        members = [("scheduler", "--port", "0"), *[("worker", "--nthreads", "1", "--no-nanny")] * WORKERS]
+        cluster = [start(_member, folder, *member, *file) for member in members]
         try:
             process = start(live, folder, _address(known))
             yield process
@@ -186,9 +174,17 @@ def dask(victim: int) -> Callable[..., Told]:
         finally:
             for each in cluster:
                 each.kill()
-                each.wait()
+                each.join()
 
     return fault
+
+
+def _member(folder: Path, kind: str, *options: str) -> None:
+    """The scheduler or a worker of a Dask cluster, as its command starts it, in a process that has imported torch."""
+    os.chdir(folder)
+    for output in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    import_module(f"distributed.cli.dask_{kind}").main(list(options))
 
 
 def _address(known: Path) -> str:
