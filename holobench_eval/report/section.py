@@ -27,9 +27,9 @@ class Report:
     """What sections are made from.
 
     records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
-    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by file, where
-    the thumbnails are not there to draw them from (None: they are); drawn: the folder of the figures where it is none
-    of the report's.
+    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by
+    file, where the thumbnails are not there to draw them from (None: they are); drawn: the folder of the figures where
+    it is none of the report's.
     """
 
     results: Results
