@@ -70,7 +70,6 @@ def stage_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def no_physics() -> Iterator[None]:
-    """Tasks meet the fake display and the fake score."""
-    with fake_study.installed():
-        yield
+def no_physics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks meet the fake display and the fake score. A test that puts others in their place undoes them in order."""
+    fake_study.install(monkeypatch.setattr)

@@ -7,7 +7,7 @@ import os
 import sys
 import time
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -209,18 +209,17 @@ FAKES: tuple[tuple[types.ModuleType, str, Any], ...] = (
 """Where the machinery calls the physics, and what stands there instead."""
 
 
-def install() -> None:
+def install(put: Callable[[Any, str, Any], None] = setattr) -> None:
     """Put the fakes where a task calls the physics."""
     for module, name, fake in FAKES:
-        setattr(module, name, fake)
+        put(module, name, fake)
 
 
 @contextmanager
 def installed() -> Iterator[None]:
     """The fakes are there within the context."""
     with pytest.MonkeyPatch.context() as patch:
-        for module, name, fake in FAKES:
-            patch.setattr(module, name, fake)
+        install(patch.setattr)
         yield
 
 

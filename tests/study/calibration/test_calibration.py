@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from holobench_eval.commands.calibrate import calibrate
+from holobench_eval.commands.own.calibrate import calibrate
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.study.calibration import Calibration, Prediction, load_calibration, names

@@ -25,7 +25,7 @@ from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
 from tests.study.studies import add_other_profile
-from tests.support.fake_study import FAKES, fake_work, held, solves, untimed, write_config
+from tests.support.fake_study import fake_work, held, installed, solves, untimed, write_config
 from tests.support.patience import killed_at
 
 pytestmark = pytest.mark.usefixtures("no_physics")
@@ -60,9 +60,7 @@ def score(records: list[dict[str, Any]], label: str, target: str) -> float:
 def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a computed study, which no test changes."""
     folder = tmp_path_factory.mktemp("computed")
-    with pytest.MonkeyPatch.context() as patch:
-        for module, name, fake in FAKES:
-            patch.setattr(module, name, fake)
+    with installed():
         compute(write_config(folder, (FOLLOWING, POOR, GOOD), count=len(TARGETS)))
     return folder
 
