@@ -6,7 +6,7 @@ The same holograms are photographed on one and captured on the other.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.stats import kendalltau
-from torch import Tensor
 
 from ..core.io import write_atomically
 from ..display.estimates import QUANTITIES
@@ -25,12 +24,12 @@ from ..study.plan import Cell
 from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .data.statistics import Estimate, mean_interval
+from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
 from .sections.diagnosis import quantities
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"
-DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,8 @@ class Trial:
     """A twin that was tried.
 
     label: of the method whose holograms were made through it; pictures: by name; display: scores on the display
-    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. is_simulated:
-    whether the display is.
+    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. misfit: of the twin;
+    is_simulated: whether the display is.
     """
 
     name: str
@@ -75,6 +74,7 @@ class Trial:
     pictures: tuple[str, ...]
     display: Mapping[str, NDArray[np.float64]]
     twins: Mapping[str, Mapping[str, Shown]]
+    misfit: Misfit
     is_simulated: bool = True
 
     @property
@@ -119,7 +119,8 @@ class Trial:
         flattery = self.difference(self.label)
         gap = {label: round(float(shown.gaps[:, 0].mean()), 2) for label, shown in self.twin.items()}
         error = round((flattery.high - flattery.low) / 2, 2)
-        return Trust(self.of, self.photographs, len(self.pictures), gap, round(flattery.mean, 2), error)
+        light, place = (tuple(round(float(each), 4) for each in own) for own in (self.misfit.light, self.misfit.place))
+        return Trust(self.of, self.photographs, len(self.pictures), gap, light, place, round(flattery.mean, 2), error)
 
 
 def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
@@ -129,7 +130,7 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
     targets = {item: photographed.target(item) for item in pictures}
     display: dict[str, NDArray[np.float64]] = {}
     twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name, photographed)}
-    on_twins = trial.cells()
+    on_twins, compared = trial.cells(), list[Compared]()
     noise = {
         item: Noise.of([photographed.pair(*key) for key in photographed.twice if key[1] == item]) for item in pictures
     }
@@ -138,63 +139,20 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
         display[label] = np.array([np.mean([score for _, score in shots]) for shots in own.values()])
         for each, shown in twins.items():
             others = {item: trial.captures(on_twins[each][label, item][0]) for item in pictures}
-            likeness, gaps = zip(
-                *(further(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures),
-                strict=True,
-            )
+            shots = [Compared(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures]
+            likeness, gaps = zip(*(further(shot) for shot in shots), strict=True)
+            compared += shots * (each == name)
             scores = np.array([score for _, score in others.values()])
             shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
     learned = photographed.learned.provenance["captures"]
     of, is_simulated = photographed.display.name, photographed.display.real is None
-    return Trial(name, of, photographed.label, learned, pictures, display, twins, is_simulated)
+    return Trial(name, of, photographed.label, learned, pictures, display, twins, Misfit.of(compared), is_simulated)
 
 
 def same(photographed: Photographed, label: str, item: str) -> list[Cell]:
     """The photographs of the hologram that is shown on the twin: all repeats, or the first of a method whose repeats
     have random starts."""
     return photographed.own[label, item][: None if (label, item) in photographed.twice else 1]
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Variance of a photograph, ``a + b I + c I^2`` of its light I: read noise, shot noise and flicker, by colour.
-
-    coefficients: a, b and c, ``(C, 3)``, of all photographs of one exposure.
-    """
-
-    coefficients: Tensor
-
-    @classmethod
-    def of(cls, pairs: Sequence[Sequence[Tensor]]) -> Noise:
-        """Of pairs of photographs ``(C, h, w)`` of one hologram each, in equal brightness, by least squares over all
-        pixels."""
-        firsts, seconds = (torch.stack(each).double() for each in zip(*pairs, strict=True))
-        area = (-2, -1)
-        seconds = seconds * ((firsts * seconds).sum(area, True) / seconds.square().sum(area, True).clamp_min(DARKEST))
-        light, squares = (
-            each.transpose(0, 1).flatten(1) for each in ((firsts + seconds) / 2, (firsts - seconds).square() / 2)
-        )
-        powers = torch.stack([light**power for power in range(3)], -1)
-        return cls(torch.linalg.lstsq(powers, squares[..., None]).solution[..., 0])
-
-    def __call__(self, photograph: Tensor) -> Tensor:
-        """Mean variance of a photograph ``(C, h, w)``, ``(C,)``."""
-        light = photograph.double().flatten(1)
-        means = torch.stack([(light**power).mean(1) for power in range(3)], -1)
-        return (self.coefficients * means).sum(1).clamp_min(0)
-
-
-def further(photograph: Tensor, capture: Tensor, target: Tensor, noise: Noise) -> tuple[Tensor, Tensor]:
-    """PSNR of a capture ``(C, h, w)`` against a photograph, and how much lower that is than a second photograph's would
-    be, each ``(1 + C,)`` [dB] with all colours first. The photograph is matched to the target, and the capture to the
-    photograph."""
-    factors = match(photograph, target)[1]
-    first = photograph * factors[:, None, None]  # not clipped, as noise is not
-    apart = capture * match(capture, first)[1][:, None, None] - first
-    second = (2 * noise(photograph) * factors.double().square()).clamp_min(DARKEST)
-    other = apart.double().square().mean((-2, -1)).clamp_min(DARKEST)
-    likeness, bound = (-10 * torch.cat([each.mean()[None], each]).log10() for each in (other, second))
-    return likeness, bound - likeness
 
 
 def write_twin(folder: Path, photographed: Photographed, trial: Photographed, found: Trial, profile: Path) -> Path:
@@ -233,7 +191,8 @@ def answer(found: Trial) -> Iterable[str]:
     (least, nearest), *_, (most, furthest) = sorted((gap, label) for label, gap in gaps.items())
     yield (
         f"A capture of the twin is further from a photograph than a second photograph is by {least:.1f} dB ({nearest}) "
-        f"to {most:.1f} dB ({furthest})."
+        f"to {most:.1f} dB ({furthest}). Besides noise it is off by {max(found.misfit.light):.1%} of the light and out "
+        f"of place by {max(found.misfit.place):.2f} pixels, both rms."
     )
     sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
     if flattery.mean > MOST:

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from holobench_eval.display.simulated.trust import Trust
-from holobench_eval.report.twin import Noise, Shown, Trial, further
+from holobench_eval.report.distance import Compared, Misfit, Noise, further
+from holobench_eval.report.twin import Shown, Trial
 
 SHAPE = (3, 96, 128)
 LIKE = np.full((3, 4), 35.0)
+MISFIT = Misfit(np.full(3, 0.1), np.full(3, 0.05))
 
 
 def draw(seed: int) -> torch.Generator:
@@ -44,9 +47,36 @@ def test_a_capture_is_further_than_a_second_photograph_by_its_error(light: Tenso
     twin = photograph(light + error * torch.randn(SHAPE, generator=draw(5)), 6, factor=3.0)
     variance = noise(light).mean()
     wanted = 10 * math.log10(1 + error**2 / (2 * float(variance)))
-    likeness, told = further(first, twin, light, noise)
+    likeness, told = further(Compared(first, twin, light, noise))
     assert float((likeness + told)[0]) == pytest.approx(-10 * math.log10(2 * float(variance)), abs=0.05)
     assert told.tolist() == pytest.approx([wanted] * 4, abs=0.2)  # the match takes a little of any error
+
+
+def shot(seed: int, smooth: int, off: float, away: float) -> Compared:
+    """Of a picture with details of so many pixels, whose light is off by a share, and out of place by pixels."""
+    light = functional.interpolate(
+        torch.rand((1, 3, *(side // smooth for side in SHAPE[1:])), generator=draw(seed)), SHAPE[1:]
+    )
+    light = functional.avg_pool2d(light, 5, 1, 2)[0]
+    vertical, across = (away * torch.randn(SHAPE, generator=draw(seed + step)) for step in (1, 2))
+    slopes = (torch.gradient(light, dim=axis)[0] for axis in (1, 2))
+    moved = light + sum(by * slope for by, slope in zip((vertical, across), slopes, strict=True))
+    wrong = moved * (1 + off * torch.randn(SHAPE, generator=draw(seed + 3)))
+    return Compared(photograph(light, seed + 4), photograph(wrong, seed + 5), light, noise_of(light, seed))
+
+
+def noise_of(light: Tensor, seed: int) -> Noise:
+    return Noise.of([(photograph(light, seed + 6), photograph(light, seed + 7))])
+
+
+@pytest.mark.parametrize(("off", "away"), [(0.0, 0.0), (0.1, 0.0), (0.0, 0.3), (0.1, 0.3)])
+def test_a_misfit_in_light_and_in_place_tells_the_distance_of_other_pictures(off: float, away: float) -> None:
+    found = Misfit.of([shot(seed, smooth, off, away) for seed, smooth in ((10, 2), (20, 4), (30, 8), (40, 16))])
+    if not away:  # noise has slopes, too, and what is out of place more
+        assert found.light == pytest.approx([off] * 3, abs=0.02)
+    for seed, smooth in ((50, 3), (60, 6), (70, 12)):
+        other = shot(seed, smooth, off, away)
+        assert found.further(other) == pytest.approx(float(further(other)[1][0]), abs=0.5)
 
 
 def trial() -> Trial:
@@ -54,7 +84,7 @@ def trial() -> Trial:
     shown = {label: Shown(scores + 0.5, LIKE, np.ones((3, 4))) for label, scores in display.items()}
     own = {**shown, "own": Shown(display["own"] + np.array([1.0, 2.0, 3.0]), LIKE, np.full((3, 4), 2.0))}
     turned = {**shown, "bad": Shown(display["bad"] + 9, LIKE, np.ones((3, 4)))}
-    return Trial("lab", "bench", "own", 59, ("a", "b", "c"), display, {"lab": own, "lab-turned": turned})
+    return Trial("lab", "bench", "own", 59, ("a", "b", "c"), display, {"lab": own, "lab-turned": turned}, MISFIT)
 
 
 def test_flattery_is_what_its_own_holograms_score_more_on_the_twin() -> None:
@@ -72,7 +102,7 @@ def test_differences_of_methods_are_compared_in_pairs_and_orders() -> None:
 
 def test_a_profile_says_what_its_twin_was_tried_on() -> None:
     trust = trial().trust()
-    assert trust == Trust("bench", 59, 3, {"good": 1.0, "bad": 1.0, "own": 2.0}, 2.0, 2.48)
+    assert trust == Trust("bench", 59, 3, {"good": 1.0, "bad": 1.0, "own": 2.0}, (0.1,) * 3, (0.05,) * 3, 2.0, 2.48)
     assert "trained with 59 photographs" in trust.words
     assert "score 2.0 ± 2.5 dB too high" in trust.words
     assert "more than 3 dB" not in trust.words
