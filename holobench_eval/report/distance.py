@@ -87,7 +87,8 @@ def further(shot: Compared) -> tuple[Tensor, Tensor]:
 @dataclass(frozen=True)
 class Misfit:
     """What a twin is off by besides noise, by colour: the share of the light ``(C,)``, and its place along each axis
-    ``(C,)`` [px of the target], both rms and independent from pixel to pixel."""
+    ``(C,)`` [px of the target], both rms and independent from pixel to pixel. Together they tell how much further a
+    capture is; one stands for the other where all pictures have details of one size."""
 
     light: NDArray[np.float64]
     place: NDArray[np.float64]
@@ -100,9 +101,3 @@ class Misfit:
         contents = np.array([shot.contents for shot in shots]) / noise[..., None]
         squares = np.array([nnls(contents[:, colour], left[:, colour])[0] for colour in range(noise.shape[1])])
         return cls(*np.sqrt(squares).T)
-
-    def further(self, shot: Compared) -> float:
-        """What it says of ``further`` [dB], of all colours, by the capture and the photograph's noise alone."""
-        noise = shot.noise_alone.numpy()
-        error = (shot.contents * np.stack([self.light, self.place], -1) ** 2).sum(-1)
-        return float(10 * np.log10((noise + error).mean() / noise.mean()))

@@ -63,7 +63,7 @@ class Trial:
     """A twin that was tried.
 
     label: of the method whose holograms were made through it; pictures: by name; display: scores on the display
-    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. misfit: of the twin;
+    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. misfit: of a twin;
     is_simulated: whether the display is.
     """
 
@@ -74,7 +74,7 @@ class Trial:
     pictures: tuple[str, ...]
     display: Mapping[str, NDArray[np.float64]]
     twins: Mapping[str, Mapping[str, Shown]]
-    misfit: Misfit
+    misfit: Misfit | None
     is_simulated: bool = True
 
     @property
@@ -119,7 +119,8 @@ class Trial:
         flattery = self.difference(self.label)
         gap = {label: round(float(shown.gaps[:, 0].mean()), 2) for label, shown in self.twin.items()}
         error = round((flattery.high - flattery.low) / 2, 2)
-        light, place = (tuple(round(float(each), 4) for each in own) for own in (self.misfit.light, self.misfit.place))
+        off = (self.misfit.light, self.misfit.place) if self.misfit else ((), ())
+        light, place = (tuple(round(float(each), 4) for each in own) for own in off)
         return Trust(self.of, self.photographs, len(self.pictures), gap, light, place, round(flattery.mean, 2), error)
 
 
@@ -145,8 +146,9 @@ def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
             scores = np.array([score for _, score in others.values()])
             shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
     learned = photographed.learned.provenance["captures"]
+    misfit = Misfit.of(compared) if photographed.row.name == "twin" else None  # a network has no noise
     of, is_simulated = photographed.display.name, photographed.display.real is None
-    return Trial(name, of, photographed.label, learned, pictures, display, twins, Misfit.of(compared), is_simulated)
+    return Trial(name, of, photographed.label, learned, pictures, display, twins, misfit, is_simulated)
 
 
 def same(photographed: Photographed, label: str, item: str) -> list[Cell]:
@@ -191,9 +193,13 @@ def answer(found: Trial) -> Iterable[str]:
     (least, nearest), *_, (most, furthest) = sorted((gap, label) for label, gap in gaps.items())
     yield (
         f"A capture of the twin is further from a photograph than a second photograph is by {least:.1f} dB ({nearest}) "
-        f"to {most:.1f} dB ({furthest}). Besides noise it is off by {max(found.misfit.light):.1%} of the light and out "
-        f"of place by {max(found.misfit.place):.2f} pixels, both rms."
+        f"to {most:.1f} dB ({furthest})."
     )
+    if found.misfit:
+        yield (
+            f"Besides noise it is off by as much as {max(found.misfit.light):.1%} of the light and "
+            f"{max(found.misfit.place):.2f} pixels out of place would make, both rms."
+        )
     sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
     if flattery.mean > MOST:
         sentence += f" That is more than {MOST:g} dB: it does not tell which method that learns is better."

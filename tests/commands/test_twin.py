@@ -58,6 +58,8 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
     assert profile.spec().shape == PANEL
     assert "illumination.amplitude" in profile.held
     assert profile.twin.pictures == 3
+    assert len(profile.twin.light) == len(profile.twin.place) == 1
+    assert not Path("lab/work/trial/report.md").exists()
     assert profile.twin.gap.keys() == {"double_phase", "wirtinger", "twin"}
     photographs = json.loads(next(Path("artifacts").glob("twin-*/provenance.json")).read_text())["captures"]
     assert profile.twin.photographs == photographs
@@ -141,5 +143,6 @@ def test_a_trained_method_becomes_a_display_that_a_study_runs_on(quick: Path) ->
     twin(str(write_green(quick, "leto-aged")), Path("net"), panel=PANEL, pictures=3, network="parametric_model")
     profile = load_profile("net/net.yaml")
     assert (profile.network.method, profile.twin.of, profile.twin.pictures) == ("parametric_model", "green", 3)
+    assert profile.twin.light == ()
     assert "net-turned" not in Path("net/report.md").read_text()
     assert basis(profile).startswith("predicted by a trained parametric_model, a twin of green, trained with")

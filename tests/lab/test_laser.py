@@ -1,3 +1,4 @@
+import os
 import sys
 
 import pytest
@@ -76,3 +77,12 @@ def test_a_laser_that_nobody_can_switch_is_blocked_by_the_user_only_when_needed(
         source.select(channel)
     source.close()
     assert asked == ["block the laser beam", "open the laser beam again"]
+
+
+def test_a_function_that_was_edited_is_imported_again_and_never_from_bytecode(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "mine.py"
+    for number in (1, 2):  # equal size and equal time, which is all that bytecode is checked by
+        file.write_text(f"def switch(channel):\n    return {number}\n")
+        os.utime(file, (1e9, 1e9))
+        assert laser(LaserSettings(callable="mine.py:switch"), 3, tmp_path, silent).function(0) == number

@@ -47,8 +47,8 @@ def draw(results: Results, condition: str, path: Path) -> None:
     """
     baseline, score = results.layout.baseline, results.headline
     assert baseline is not None
-    floor, own = results.floor(condition), results.values(baseline, condition)
-    lines = {} if floor is None else {"floor: a constant image": floor - float(np.nanmean(own))}
+    floor = results.floor(condition, less=results.values(baseline, condition))
+    lines = {} if floor is None else {"floor: a constant image": floor}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
 

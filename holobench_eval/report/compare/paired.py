@@ -270,10 +270,13 @@ def _rows(both: pd.DataFrame, score: Score, clusters: Mapping[str, str]) -> list
     """A row for each method and pair of displays, with p values that are adjusted for all of them."""
     keys = ["label", f"{OWN}{A}", f"{OWN}{B}"]
     means = both.groupby([*keys, "target"], sort=False)[[f"value{A}", f"value{B}"]].mean()
-    differences = (means[f"value{B}"] - means[f"value{A}"]).unstack("target", sort=False)
-    adjusted = family_p(differences.to_numpy(), [clusters[str(target)] for target in differences])
+    groups, order = list(means.groupby(level=keys, sort=False)), means.index.get_level_values("target").unique()
+    # unstack(sort=False) of pandas before 3 puts values under other targets where a method has holes.
+    differences = (means[f"value{B}"] - means[f"value{A}"]).unstack("target")
+    differences = differences.reindex(index=[name for name, _ in groups], columns=order)
+    adjusted = family_p(differences.to_numpy(), [clusters[str(target)] for target in order])
     found = []
-    for ((method, of_a, of_b), group), p in zip(means.groupby(level=keys, sort=False), adjusted, strict=True):
+    for ((method, of_a, of_b), group), p in zip(groups, adjusted, strict=True):
         targets = tuple(map(str, group.index.get_level_values("target")))
         first, second = group.to_numpy(dtype=np.float64).T
         change = mean_interval(second - first, [clusters[target] for target in targets])

@@ -221,8 +221,10 @@ class Results:
             for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
-    def floor(self, condition: str) -> float | None:
-        """The mean of a constant image under ``condition``; None where none was scored against its pictures."""
+    def floor(self, condition: str, less: Array | float = 0.0) -> float | None:
+        """The mean of a constant image under ``condition``, less other values of the targets; of those that have both.
+        None where there are none."""
         if CONSTANT not in self.floors or not self.has_pictures(condition):
             return None
-        return float(self.values(CONSTANT, self.reference(condition)).mean())
+        values = self.values(CONSTANT, self.reference(condition)) - less
+        return float(np.nanmean(values)) if np.isfinite(values).any() else None

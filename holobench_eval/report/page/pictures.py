@@ -21,6 +21,7 @@ from .data import Json
 TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit
 
 Key = TypeVar("Key")
+T = TypeVar("T")
 Cell = tuple[str, str, str]  # method, condition, target; a target itself has neither method nor condition
 MOST_BYTES = 3_000_000  # of all pictures of a report
 QUALITY = 85  # of WebP, 0 to 100: a sixth of the bytes of PNG
@@ -28,13 +29,10 @@ MARK, SAYS = "README.md", b"Small copies of the pictures of the report beside th
 
 
 def _fitting(
-    groups: Iterable[Mapping[Key, Path]],
-    room: int,
-    content: Callable[[Path], bytes],
-    size: Callable[[bytes], int] = len,
-) -> dict[Key, bytes]:
+    groups: Iterable[Mapping[Key, Path]], room: int, content: Callable[[Path], T], size: Callable[[T], int]
+) -> dict[Key, T]:
     """The contents of groups of files, first things first: what is new of a group comes all or, without room, not."""
-    kept = dict[Key, bytes]()
+    kept = dict[Key, T]()
     for group in groups:
         new = {key: content(path) for key, path in group.items() if key not in kept}
         if (taken := sum(map(size, new.values()))) <= room:
@@ -42,8 +40,8 @@ def _fitting(
     return kept
 
 
-def _base64_length(content: bytes) -> int:
-    return -(-len(content) // 3) * 4
+def _base64_length(path: Path) -> int:
+    return -(-path.stat().st_size // 3) * 4
 
 
 def pictures(report: Report, room: int) -> tuple[dict[Cell, bytes], Json]:
@@ -55,7 +53,8 @@ def pictures(report: Report, room: int) -> tuple[dict[Cell, bytes], Json]:
     """
     everything = files(report, planned(report))
     some = ({cell: everything[cell] for cell in wanted if cell in everything} for wanted in groups(report))
-    found = _fitting([everything, *some], room, Path.read_bytes, _base64_length)
+    chosen = _fitting(itertools.chain([everything], some), room, Path, _base64_length)
+    found = {cell: path.read_bytes() for cell, path in chosen.items()}
     return found, {**_numbers(report, found), "note": _note(report, len(found), len(everything))}
 
 
@@ -159,7 +158,7 @@ def keep_copies(report: Report) -> None:
     wanted = (
         {known[cell].stem: known[cell] for cell in group if cell in known} for group in [*groups(report), *by_target]
     )
-    kept = {stem: content for stem, content in _fitting(wanted, MOST_BYTES, _encoded).items() if content}
+    kept = {stem: content for stem, content in _fitting(wanted, MOST_BYTES, _encoded, len).items() if content}
     if kept:
         write_atomically(folder / MARK, SAYS)
     for old in folder.glob("*.webp"):

@@ -103,9 +103,9 @@ def _foresee(job: Job) -> Foreseen:
 def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
     """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
     seen = _foresee(job)
+    cost.keep(job.timing, seen.taken.seconds)
     wanted, factors = match(seen.capture.image, seen.target)
     image, figures = factors.view(-1, 1, 1) * seen.prediction, more(seen)
-    cost.keep(job.timing, seen.taken.seconds)
 
     def compare(cell: Cell, _: Condition) -> Record:
         keep_pictures(job, cell, image, wanted, seen.hologram.phase)

@@ -11,7 +11,7 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report.compare.paired import Comparison, Unpaired, compare, provenance_differences, read_run
-from holobench_eval.report.data.statistics import mean_interval
+from holobench_eval.report.data.statistics import family_p, mean_interval
 from holobench_eval.report.data.tables import csv_text
 from tests.support.records_on_disk import Scores, write_report
 
@@ -135,6 +135,19 @@ def test_a_cell_that_failed_or_is_in_one_run_alone_is_in_no_mean_and_is_listed(t
     failed = Unpaired("A", "m", "d", 1, "failed: no light")
     alone = Unpaired("B", "m", "d", 1, "no such target or repeat")
     assert set(comparison.unpaired) == {failed, alone}
+
+
+def test_p_values_of_methods_with_holes_are_those_of_their_targets(tmp_path: Path) -> None:
+    after: dict[str, list[float | None]] = {
+        "m": [*shifted(0.5), 25.0],
+        "n": [None, 21.4, None, 23.2, 24.9],
+        "o": [20.3, None, 22.1, 23.4, 24.1],
+    }
+    before = [*BASE, 24.0]
+    rows = compared(tmp_path, {(m, "d"): before for m in after}, {(m, "d"): new for m, new in after.items()}).rows
+    changes = np.array([[np.nan if value is None else value for value in new] for new in after.values()]) - before
+    wanted = dict(zip(after, family_p(changes, [f"t{index}" for index in range(5)]), strict=True))
+    assert {row.method: row.p for row in rows} == pytest.approx(wanted)
 
 
 def test_the_targets_that_changed_most_come_first(tmp_path: Path) -> None:

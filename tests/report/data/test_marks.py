@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -54,6 +55,15 @@ def test_a_network_that_predicts_worse_than_no_training_is_marked(
     }
     rows = {row.label: row.marks for row in board(found).displays[0].rows}
     assert rows == gray | {"U-Net": (*filter(None, [mark.removeprefix(", ")]), *gray["U-Net"])}
+
+
+def test_a_gray_picture_scores_the_mean_of_what_is_known_of_it() -> None:
+    found = results(20.0, 19.0, 18.0, measure="picture")
+    assert found.floor(DISPLAY) == pytest.approx(18.0)
+    values = found.values("Wirtinger", DISPLAY).copy()
+    values[0] = math.nan
+    assert found.floor(DISPLAY, less=values) == pytest.approx(18.0 - 40.0)
+    assert found.floor(DISPLAY, less=values * math.nan) is None
 
 
 def test_a_fallback_stands_in_the_row_and_survives_the_file_of_records() -> None:
