@@ -158,8 +158,12 @@ def _checked(path: Path, _state: State | None, gray: bool, sixteen_bit: SixteenB
 @lru_cache(maxsize=16)
 def _manifest(path: Path, _state: State | None) -> dict[str, str]:
     """Name and sum of every line; UserError for a line of another form and for a path that leaves its folder."""
+    try:
+        lines = read_text(path, LARGEST_MANIFEST).split("\n")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     sums: dict[str, str] = {}
-    for number, line in enumerate(read_text(path, LARGEST_MANIFEST).split("\n"), start=1):
+    for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue
         parts = _MANIFEST_LINE.fullmatch(line)

@@ -13,7 +13,7 @@ import typer
 from ..core.errors import UserError
 from .options import ARTIFACTS, PANEL, RETRAIN, Learned, thread_count
 from .output import console
-from .run import resumable, run
+from .run import open_displays, resumable, run
 
 if TYPE_CHECKING:
     from ..study.calibration.twin import Photographed
@@ -119,6 +119,7 @@ def _photographs(
 
 def _show_on_twin(output: Path, artifacts: Path) -> None:
     """Capture the holograms on the twin and those it has to be better than. The report of the twin has what counts."""
+    from ..core.device import find
     from ..study.calibration.twin import TRIAL, WORK
     from ..study.config import load_study
     from ..study.executors import Serial
@@ -128,5 +129,7 @@ def _show_on_twin(output: Path, artifacts: Path) -> None:
 
     work = output / WORK
     study = load_study(work / f"{TRIAL}.yaml")
+    open_displays(study)
+    threads, device = thread_count(None, 1, study), str(find("auto"))
     with resumable(), watching(console()) as watch:
-        compute(study, plan(study), work / TRIAL, Serial(), watch, thread_count(None, 1, study), artifacts)
+        compute(study, plan(study), work / TRIAL, Serial(), watch, threads, artifacts, device=device)

@@ -19,6 +19,7 @@ from ...optics.convolution import frequencies
 from ...optics.padding import padded_shape
 from ...optics.phase import blaze
 from ...optics.phasor import squared_modulus
+from ...optics.transfer import by_columns
 from ..api import Capture, DisplaySpec
 from .fourier_path import FourierPath
 from .fused_path import FusedPath, quickest
@@ -163,6 +164,7 @@ class SimulatedBench:
         fy, fx = frequencies(padded, geometry.pitch)
         for factor in present(stage.transmission(fy, fx, geometry) for stage in profile.stages):
             legs[-1] = legs[-1] * factor.to(legs[-1].dtype)
+        legs = list(map(by_columns, legs))  # the order in memory decides how complex products are rounded
         dust, last = (None, None) if plane is None else (plane - 1, legs[1])
         path = OpticalPath(geometry.shape, rows, columns, legs[0], dust, last, self.image_samples)
         return quickest(path, self.device)
