@@ -47,9 +47,10 @@ def _base64_length(path: Path) -> int:
 def pictures(report: Report, room: int) -> tuple[dict[Cell, bytes], Json]:
     """The pictures that fit into ``room`` bytes of base64, and what the page says of them.
 
-    Where not all fit, first come ``TARGETS_IN_FULL`` targets, evenly spaced from worst to best, with the captures of
-    all methods on every display; then, target by target, the best method, the baseline and the oracle on every
-    display; then the same on the changed displays, for the first targets only. A target's pictures come all or not.
+    Where not all fit, first come ``TARGETS_IN_FULL`` targets, evenly spaced from worst to best and those in the middle
+    first, with the captures of all methods on every display; then, target by target, the best method, the baseline and
+    the oracle on every display; then the same on the changed displays, for the first targets only. A target's pictures
+    come all or not.
     """
     everything = files(report, planned(report))
     some = ({cell: everything[cell] for cell in wanted if cell in everything} for wanted in groups(report))
@@ -95,7 +96,8 @@ def groups(report: Report) -> Iterator[list[Cell]]:
     results, conditions = report.results, _pictured(report.results, report.results.conditions)
     if not conditions:
         return
-    first = spread(report.thumbnails.by_quality(conditions[0]), TARGETS_IN_FULL)
+    ranked = report.thumbnails.by_quality(conditions[0])
+    first = sorted(spread(ranked, TARGETS_IN_FULL), key=lambda target: abs(ranked.index(target) - len(ranked) // 2))
     for target in first:
         cells = ((label, name, target) for name in conditions for label in results.methods(name))
         yield [*_truths(report, target), *cells]
