@@ -16,7 +16,7 @@ from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
 from ..data.tables import to_json
-from ..data.text import number, p_value
+from ..data.text import number
 from ..section import Report
 
 Json = dict[str, Any]
@@ -100,7 +100,7 @@ def _row(results: Results, label: str, condition: str, tier: str) -> Json:
     if gain is not None and label != results.layout.baseline:
         cells[GAIN] = _estimate(results.headline, gain, signed=True)
     if test and not math.isnan(test.p):
-        cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
+        cells[P] = _cell("< 0.001" if test.p < 0.001 else f"{test.p:.3f}", test.p)
     cells |= {key: _cell(number(row[key]), row[key]) for key in costs(results.table, "")}
     return {
         "method": label,
