@@ -47,6 +47,9 @@ class Tile:
     note: str
 
 
+Row = tuple[str, Sequence[tuple[str, Tile]]]  # a method, and its captures by headings that are alike in all rows
+
+
 def load_picture(path: Path) -> Picture | None:
     """A thumbnail as ``(h, w, 3)`` sRGB values in [0, 1]; None when the file is not there or damaged."""
     try:
@@ -173,14 +176,6 @@ CHARACTER = 6.6  # width in pixels of an average character of the captions
 LARGEST_TILE = 224  # pixels; of wider pictures a window is drawn, half as wide and high
 
 
-@dataclass(frozen=True)
-class Row:
-    """A method's captures. tiles: (heading, capture), headings alike in all rows."""
-
-    label: str
-    tiles: tuple[tuple[str, Tile], ...]
-
-
 def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequence[Row]) -> None:
     """Draw the rows, the target ``(h, w, 3)`` to the left of the first. Nothing is drawn without rows."""
     if not rows:
@@ -188,17 +183,17 @@ def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequenc
     name, picture = target
     window = most_detailed(picture, 2) if picture.shape[1] > LARGEST_TILE else np.s_[:, :]
     tall, wide = tile_size(picture[window].shape)
-    columns = 1 + max(len(row.tiles) for row in rows)
+    columns = 1 + max(len(tiles) for _, tiles in rows)
     with style():
         page = Page(SIDE + columns * (wide + GAP), HEADER + len(rows) * (tall + CAPTION + GAP))
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
         page.text(SIDE + wide / 2, HEADER - 4, f"target: {name}", ha="center", va="bottom")
         page.paste(SIDE, HEADER, (tall, wide), picture[window])
-        for index, row in enumerate(rows):
+        for index, (method, tiles) in enumerate(rows):
             top = HEADER + index * (tall + CAPTION + GAP)
-            label = textwrap.shorten(row.label, int(tall / CHARACTER), placeholder="...")
+            label = textwrap.shorten(method, int(tall / CHARACTER), placeholder="...")
             page.text(SIDE - 8, top + tall / 2, label, rotation=90, ha="right", va="center")
-            for column, (heading, tile) in enumerate(row.tiles, start=1):
+            for column, (heading, tile) in enumerate(tiles, start=1):
                 left = SIDE + column * (wide + GAP)
                 if index == 0:
                     page.text(left + wide / 2, HEADER - 4, heading, ha="center", va="bottom")

@@ -8,7 +8,6 @@ from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
 from holobench_eval.report.charts.tiles import (
     HEADER,
     SIDE,
-    Row,
     Tile,
     draw_comparison,
     draw_rows,
@@ -50,7 +49,7 @@ def test_targets_of_a_large_study_are_spread_from_first_to_last():
 def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(tmp_path):
     target, capture = noise(200), noise(200, seed=1)
     tiles = (("method", Tile(capture, "PSNR 7.00 dB")), ("lost", Tile(None, "failed: the residual is too large $x$")))
-    draw_rows(tmp_path / "page.png", "bench", ("noise", target), [Row("", tiles)])
+    draw_rows(tmp_path / "page.png", "bench", ("noise", target), [("", tiles)])
     page = load_picture(tmp_path / "page.png")
     first, second = (page[HEADER : HEADER + 200, SIDE + place * 208 :][:, :200] for place in (1, 2))
     assert np.abs(first - capture).max() < 1 / 255
