@@ -81,8 +81,8 @@ class Ranks:
 
     @property
     def exists(self) -> bool:
-        """Whether there is a ranking: two methods and a draw."""
-        return len(self.methods) > 1 and bool(self.used)
+        """Whether there is a ranking: two methods that differ, and a draw."""
+        return len(self.methods) > 1 and len(self.taus) > 0
 
     @cached_property
     def nominal(self) -> Array:

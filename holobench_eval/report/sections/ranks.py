@@ -96,15 +96,11 @@ def draw(rankings: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
     for ranks in existing:
         path = folder / f"quality-ranks-{stems[ranks.swept.before]}.png"
         draw_ranks(path, ranks)
-        right = (
-            " Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean and 95 % "
-            "interval; dashed: unrelated."
-        )
         yield (
             path,
             f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in "
-            "which a method has each rank; methods in nominal order, nominal ranks framed."
-            f"{right if len(ranks.taus) else ''}",
+            "which a method has each rank; methods in nominal order, nominal ranks framed. Right: draws by Kendall's "
+            "tau-b of their ranking against the nominal one. Dot and bar: mean and 95 % interval; dashed: unrelated.",
         )
 
 
