@@ -306,8 +306,8 @@ def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: 
         first, second = photographed.pair(label, item)
         twin = trial.captures(on_twins[found.name][label, item][0])[0]
         shown = match(first, target)[0]
-        rows[label] = shown.numpy(), match(second, shown)[0].numpy(), match(twin, shown)[0].numpy()
-    draw_twin_pictures(folder / PICTURES, rows)
+        rows[label] = shown, match(second, shown)[0], match(twin, shown)[0]
+    draw_twin_pictures(folder / PICTURES, f"{found.of} and {found.name}", (item, target), rows)
     names = {entry.label: entry.name for entry in photographed.study.methods}
     own, *others = ({label: each.scores for label, each in shown.items()} for shown in found.twins.values())
     draw_twin_scores(folder / SCORES, found.display, own, looks(names), others)
