@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ..data.board import GROUPS, Board, Display, Row
 from ..data.layout import ORACLE
 from ..data.phrases import verdict
@@ -23,7 +25,7 @@ def board_table(board: Board) -> Markdown | None:
 def display_table(board: Board, display: Display) -> Markdown | None:
     """The board of a display: a row a method, the name of its group above it."""
     has_panel_time = any(row.panel_time is not None for row in display.rows)
-    lines = list[dict[str, object]]()
+    lines = list[Mapping[str, object]]()
     for group, rows in display.groups:
         own = [_line(board, row, group, has_panel_time) for row in rows]
         if len(display.groups) > 1:
