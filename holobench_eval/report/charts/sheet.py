@@ -167,17 +167,16 @@ def _field_stages(axes: list[Axes], bench: SimulatedBench) -> None:
     """Spectrum, illumination, dirt, pupil with aberration, stray light, sensor response."""
     profile, maps = bench.profile, _middle(bench)
     _spectrum(axes[0], bench)
-    axes = axes[1:]
     light = profile.illumination.panel(maps.geometry)
-    _picture(axes[0], light.abs(), f"illumination amplitude{_named(bench)}", "relative amplitude")
-    _picture(axes[1], light.angle(), f"illumination phase{_named(bench)}", "phase [rad]", "twilight")
-    _picture(axes[2], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
+    _picture(axes[1], light.abs(), f"illumination amplitude{_named(bench)}", "relative amplitude")
+    _picture(axes[2], light.angle(), f"illumination phase{_named(bench)}", "phase [rad]", "twilight")
+    _picture(axes[3], profile.coherent_noise.panel(maps.geometry).abs(), "dust and scratches at the panel", "amplitude")
     plane = profile.coherent_noise.plane(maps.geometry)
     clean = torch.ones(bench.spec.shape)
-    _picture(axes[3], clean if plane is None else plane.real, "dust on the plane before the image", "amplitude")
-    _aberration(axes[4], bench)
-    _veil(axes[5], bench)
-    _picture(axes[6], bench.response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
+    _picture(axes[4], clean if plane is None else plane.real, "dust on the plane before the image", "amplitude")
+    _aberration(axes[5], bench)
+    _veil(axes[6], bench)
+    _picture(axes[7], bench.response, "sensor response: vignetting, fixed pattern", "relative response", "gray")
 
 
 def _aberration(axis: Axes, bench: SimulatedBench) -> None:

@@ -149,10 +149,8 @@ class Thumbnails:
     def by_quality(self, condition: str) -> list[str]:
         """The targets that have a picture, from worst to best by their mean over methods."""
         results = self.results
-        values = np.vstack([results.values(label, condition) for label in results.methods(condition)])
-        known = np.isfinite(values)
-        means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-        quality = dict(zip(results.targets, results.headline.sign * means, strict=True))
+        values = pd.DataFrame([results.values(label, condition) for label in results.methods(condition)])
+        quality = dict(zip(results.targets, results.headline.sign * values.mean().fillna(0.0), strict=True))
         return sorted(self.targets(condition), key=lambda target: quality[target])
 
     def middle(self, condition: str) -> str:

@@ -29,7 +29,7 @@ def page_data(report: Report) -> Json:
     results, text = report.results, report.results.layout.text
     tiers = {display.name: {row.label: row.tier for row in display.rows} for display in board(results).displays}
     tiers |= {name: dict.fromkeys(results.methods(name), "") for name in results.changed}
-    colours = looks(results.names)
+    colours, column = looks(results.names), results.headline.column
     return {
         "headline": _score(results.headline),
         "baseline": results.layout.baseline,
@@ -60,7 +60,6 @@ def page_data(report: Report) -> Json:
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
-            for column in [results.headline.column]
             for name in results.conditions
         },
         "magma": colormaps["magma"](range(256), bytes=True)[:, :3].tolist(),
