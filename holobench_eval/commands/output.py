@@ -99,9 +99,7 @@ def board_of(drawn: Board, display: Display) -> Table:
         if len(display.groups) > 1:
             table.add_row("", f"[bold]{GROUPS[group]}[/]")
         for row in rows:
-            named = ", ".join([row.label, *row.marks])
-            lacks = f", {row.scored} of {len(results.targets)} targets" * (row.scored < len(results.targets))
-            cells = [row.tier, f"{named}{lacks}", score.number(row.score.mean)]
+            cells = [row.tier, ", ".join([row.label, *drawn.marks(row)]), score.number(row.score.mean)]
             if results.layout.baseline:
                 cells.append(score.estimate(row.test.estimate, signed=True) if row.test else "")
             cells += ["–" if row.photographs is None else number(row.photographs)] if spends else []

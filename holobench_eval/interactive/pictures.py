@@ -179,7 +179,7 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
     UserError
         No captures, other shapes or values, or a path that ends otherwise.
     """
-    from ..report.charts.tiles import Tile, draw_comparison, error_limit, error_map
+    from ..report.charts.tiles import draw_comparison
 
     place = path_of(path, "path")
     if place.suffix.lower() not in ENDINGS:
@@ -197,17 +197,15 @@ def compare(target: Numbers, captures: Mapping[str, Numbers], path: str | Path =
             raise UserError(
                 f"capture '{name}' of {tuple(image.shape)}; expected that of the target, {tuple(wanted.shape)}"
             )
-    measured = {name: score(image, target=wanted, metrics=("psnr", "ssim")) for name, image in images.items()}
-    truth, columns, errors = _picture(wanted), [], []
-    for name, scores in measured.items():
-        shown = _picture(match(images[name], wanted)[0])
+    columns = []
+    for name, image in images.items():
+        scores = score(image, target=wanted, metrics=("psnr", "ssim"))
         note = f"PSNR {scores['psnr_linear']:.2f} dB, SSIM {scores['ssim_linear']:.3f}"
-        columns.append((name, Tile(shown, note)))
-        errors.append(error_map(shown, truth))
+        columns.append((name, note, _picture(match(image, wanted)[0])))
     title = "captures, each at the brightness that fits best"
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        draw_comparison(place, title, truth, columns, error_limit(errors))
+        draw_comparison(place, title, _picture(wanted), columns)
     except OSError as error:
         raise UserError(f"path: '{path}' cannot be written: {error.strerror or error}") from None
     return place

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from .data.results import Results
 from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
-from .markdown import DETAILS, REPORT, Markdown, blocks, captions
+from .markdown import DETAILS, REPORT, Markdown, blocks
 from .page import write_page
 from .page.pictures import keep_copies
 from .section import Report
@@ -55,7 +54,7 @@ def write_report(
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its layout and description."""
     results = Results(records_frame(records, layout), layout, related(layout, output.parent))
-    report = Report(results, records, output, provenance, description, _kept(output) if keep_pictures else None)
+    report = Report(results, records, output, provenance, description, keep_pictures)
     write_files(results, output)
     for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
         for old in report.figures.glob(pattern):
@@ -69,15 +68,6 @@ def write_report(
     keep_copies(report)
     write_page(report)
     return output / REPORT, results
-
-
-def _kept(output: Path) -> dict[str, Markdown]:
-    """The captions of the figures made of pictures that an earlier report left, by file name."""
-    return {
-        name: Markdown(caption)
-        for name, caption in captions(output).items()
-        if any(fnmatch(name, pattern) for pattern in OF_PICTURES) and (output / "figures" / name).is_file()
-    }
 
 
 def _texts(report: Report) -> dict[str, Markdown]:
@@ -112,7 +102,7 @@ def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
 
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
     """Draw the charts of a report for one of ``MEDIA`` into a folder, none of those made of pictures; every file."""
-    printed = replace(report, kept={}, drawn=folder)
+    printed = replace(report, keeps_pictures=True, drawn=folder)
     with drawn_for(MEDIA[medium]):
         for section in sections():
             if section.applies(printed):

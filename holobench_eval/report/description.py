@@ -28,16 +28,15 @@ PER_COLOUR = ("gamma", "gain", "width")  # of stages, where a value is a tuple
 class Display:
     """A display as the report describes it: name, a heading line, and a line per property.
 
-    basis: what it is and where its parameters come from, in a sentence; modelled: the effects of a simulated display
-    that the model of a method has terms for, by the method's label, and effects: how many it has.
+    basis: what it is and where its parameters come from, in a sentence; modelled: how many effects of a simulated
+    display the model of a method has terms for, and of how many, by the method's label.
     """
 
     name: str
     heading: str
     lines: tuple[str, ...]
     basis: str = ""
-    modelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    effects: int = 0
+    modelled: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -113,8 +112,7 @@ def simulated(
         heading=f"Version {profile.version}, sha256 {profile.digest[:16]}. {profile.description}",
         lines=(f"panel: {profile.scaling_note(panel)}", _optics(profile.scaled(panel).panel), *_stages(profile)),
         basis=f"{basis(profile)}{_gray(profile.panel)}",
-        modelled={label: tuple(name for name in effects if name in form) for label, form in forms.items()},
-        effects=len(effects),
+        modelled={label: (len(form.intersection(effects)), len(effects)) for label, form in forms.items()},
     )
 
 

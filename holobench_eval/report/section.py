@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from .data.results import Results
 from .data.sweeps import Sweep, sweeps
 from .data.trainings import Training, trainings
 from .description import Description
-from .markdown import Markdown
+from .markdown import Markdown, captions
 
 Blocks = Iterable[object]  # what `markdown.blocks` takes
 Figures = Sequence[Markdown]
@@ -27,9 +26,9 @@ class Report:
     """What sections are made from.
 
     records: one for every planned cell; output: the folder of the report, with thumbnails in ``records``; provenance:
-    see ``study.running.provenance``; kept: captions of the figures made of pictures that an earlier report left, by
-    file, where the thumbnails are not there to draw them from (None: they are); drawn: the folder of the figures where
-    it is none of the report's.
+    see ``study.running.provenance``; keeps_pictures: whether the figures made of pictures are those that an earlier
+    report left, as thumbnails are not there to draw them from; drawn: the folder of the figures where it is none of the
+    report's.
     """
 
     results: Results
@@ -37,14 +36,15 @@ class Report:
     output: Path
     provenance: Mapping[str, Any]
     description: Description
-    kept: Mapping[str, Markdown] | None = None
+    keeps_pictures: bool = False
     drawn: Path | None = None
 
     def pictures(self, pattern: str, draw: Callable[[], Iterable[tuple[Path, str]]]) -> Iterable[tuple[Path, str]]:
         """(file, caption) of figures made of pictures: drawn, or those of ``pattern`` that an earlier report left."""
-        if self.kept is None:
+        if not self.keeps_pictures:
             return draw()
-        return [(self.figures / name, text) for name, text in self.kept.items() if fnmatch(name, pattern)]
+        known = ((self.figures / name, Markdown(text)) for name, text in captions(self.output).items())
+        return [(path, text) for path, text in known if path.match(pattern) and path.is_file()]
 
     @property
     def layout(self) -> Layout:

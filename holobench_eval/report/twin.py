@@ -82,9 +82,9 @@ class Trial:
         """The twin, by method."""
         return self.twins[self.name]
 
-    def difference(self, label: str, name: str = "") -> Estimate:
-        """Score on a display of the trial less score on the display; of the twin's own holograms: its flattery."""
-        return mean_interval(self.twins[name or self.name][label].scores - self.display[label])
+    def difference(self, label: str) -> Estimate:
+        """Score on the twin less score on the display; of the twin's own holograms: its flattery."""
+        return mean_interval(self.twin[label].scores - self.display[label])
 
     def pairs(self, name: str = "") -> list[Pair]:
         """Every pair of methods, on the display and on one of the trial."""
@@ -108,11 +108,9 @@ class Trial:
 
     def tau(self, name: str = "") -> float:
         """Kendall's tau between the orders of methods by their means."""
-        means = [
-            [float(np.mean(self.display[label])) for label in self.display],
-            [float(np.mean(self.twins[name or self.name][label].scores)) for label in self.display],
-        ]
-        return float(kendalltau(*means).statistic)
+        shown = self.twins[name or self.name]
+        means = [(scores.mean(), shown[label].scores.mean()) for label, scores in self.display.items()]
+        return float(kendalltau(*zip(*means, strict=True)).statistic)
 
     def trust(self) -> Trust:
         """What stands in the profile."""
@@ -308,8 +306,8 @@ def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: 
         first, second = photographed.pair(label, item)
         twin = trial.captures(on_twins[found.name][label, item][0])[0]
         shown = match(first, target)[0]
-        rows[label] = shown.numpy(), match(second, shown)[0].numpy(), match(twin, shown)[0].numpy()
-    draw_twin_pictures(folder / PICTURES, rows)
+        rows[label] = shown, match(second, shown)[0], match(twin, shown)[0]
+    draw_twin_pictures(folder / PICTURES, f"{found.of} and {found.name}", (item, target), rows)
     names = {entry.label: entry.name for entry in photographed.study.methods}
     own, *others = ({label: each.scores for label, each in shown.items()} for shown in found.twins.values())
     draw_twin_scores(folder / SCORES, found.display, own, looks(names), others)

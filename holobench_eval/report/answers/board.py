@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ..data.board import GROUPS, Board, Display, Row
 from ..data.layout import ORACLE
 from ..data.phrases import verdict
 from ..data.text import FILES, grouped, number, words
-from ..markdown import Markdown, blocks, code, escape, heading, table
+from ..markdown import Markdown, blocks, code, escape, heading, table_of
 
-PANEL_TIME, MEMORY = "panel time [frames]", "memory [MiB]"
 SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
 
 
@@ -21,37 +22,34 @@ def board_table(board: Board) -> Markdown | None:
     return blocks([*parts, _note(board)]) if board.displays else None
 
 
-def display_table(board: Board, display: Display) -> Markdown:
+def display_table(board: Board, display: Display) -> Markdown | None:
     """The board of a display: a row a method, the name of its group above it."""
-    score, layout = board.results.headline, board.results.layout
-    columns = ["", "method", score.heading]
-    columns += [f"against {layout.baseline}{score.brackets}"] * bool(layout.baseline)
-    columns += [each.name for each in board.beside]
-    costs = ["photographs"] * layout.spends_captures
-    costs += [PANEL_TIME] * any(row.panel_time is not None for row in display.rows)
-    costs += ["seconds", MEMORY] * (layout.measure != FILES)
-    lines: list[list[object]] = []
+    has_panel_time = any(row.panel_time is not None for row in display.rows)
+    lines = list[Mapping[str, object]]()
     for group, rows in display.groups:
-        name = Markdown("**{}**").format(GROUPS[group])
-        blank = [""] * (len(columns) + len(costs) - 2)
-        lines += [["", name, *blank]] if len(display.groups) > 1 else []
-        lines += [_line(board, row, group, bool(layout.baseline), costs) for row in rows]
-    return table([*columns, *costs], lines)
+        own = [_line(board, row, group, has_panel_time) for row in rows]
+        if len(display.groups) > 1:
+            lines.append(dict.fromkeys(own[0], "") | {"method": Markdown("**{}**").format(GROUPS[group])})
+        lines += own
+    return table_of(lines)
 
 
-def _line(board: Board, row: Row, group: str, tested: bool, costs: list[str]) -> list[object]:
-    score, results = board.results.headline, board.results
-    title, name = results.layout.titles.get(row.label), code(row.label)
+def _line(board: Board, row: Row, group: str, has_panel_time: bool) -> dict[str, object]:
+    score, layout = board.results.headline, board.results.layout
+    title, name = layout.titles.get(row.label), code(row.label)
     named = Markdown(", ").join([Markdown("{} ({})").format(title, name) if title else row.label, *board.marks(row)])
-    line: list[object] = [row.tier, named, score.number(row.score.mean)]
-    if tested and row.test:
-        sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
-        line.append(f"{score.estimate(row.test.estimate, signed=True)}{sign}")
-    elif tested:
-        line.append("baseline" if row.label == results.layout.baseline else "–")
-    line += [each.number(value) for each, value in zip(board.beside, row.beside, strict=True)]
-    known = {"photographs": row.photographs, PANEL_TIME: row.panel_time, "seconds": row.seconds, MEMORY: row.memory}
-    return line + [number(known[cost]) for cost in costs]
+    line: dict[str, object] = {"": row.tier, "method": named, score.heading: score.number(row.score.mean)}
+    if layout.baseline:
+        against = "baseline" if row.label == layout.baseline else "–"
+        if row.test:
+            sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
+            against = f"{score.estimate(row.test.estimate, signed=True)}{sign}"
+        line[f"against {layout.baseline}{score.brackets}"] = against
+    line |= {each.name: each.number(value) for each, value in zip(board.beside, row.beside, strict=True)}
+    costs = {"photographs": row.photographs} if layout.spends_captures else {}
+    costs |= {"panel time [frames]": row.panel_time} if has_panel_time else {}
+    costs |= {"seconds": row.seconds, "memory [MiB]": row.memory} if layout.measure != FILES else {}
+    return line | {cost: number(value) for cost, value in costs.items()}
 
 
 def _note(board: Board) -> Markdown:

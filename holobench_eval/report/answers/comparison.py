@@ -10,6 +10,7 @@ from ...core.errors import listed
 from ...study.folders.files import remedies
 from ..data.board import Display, Row, board
 from ..data.layout import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..data.over_displays import published
 from ..data.phrases import difference, verdict
 from ..data.results import Results
 from ..data.text import FILES, number, words
@@ -50,7 +51,9 @@ def of_display(results: Results, display: Display, begin: str = "") -> str:
             parts.append(f"{where}{_leads(results, rows[0], tied)}")
     for row in display.rows:
         if row.test and row.label in subjects(results) and row.label not in told:
-            parts.append(f"{row.label} {against(results, row)}{published(results, row.label, display.name)}")
+            margin = published(results, row.label, display.name)
+            said = "" if margin is None else f" (published {results.headline.with_unit(margin, signed=True)})"
+            parts.append(f"{row.label} {against(results, row)}{said}")
     text = f"{begin}{'; '.join(parts)}." if parts else ""
     return text.replace(OTHER, f" against {results.layout.baseline}", 1).replace(OTHER, "")
 
@@ -79,13 +82,6 @@ def against(results: Results, row: Row) -> str:
     shown = {"not shown to differ": ", not shown", "not tested": ", untested"}
     text = difference(results.headline, row.test.estimate)
     return f"{text}{OTHER}{shown.get(verdict(results.headline, row.test), '')}"
-
-
-def published(results: Results, label: str, condition: str) -> str:
-    """The published difference, where the config has the figures of both."""
-    score, layout = results.headline, results.layout
-    own, other = (layout.published(name, condition).get(score.metric) for name in (label, str(layout.baseline)))
-    return "" if own is None or other is None else f" (published {score.with_unit(own - other, signed=True)})"
 
 
 KIND = Kind(

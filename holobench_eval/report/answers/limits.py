@@ -72,10 +72,10 @@ def _displays(report: Report) -> Iterator[str]:
 def _form(report: Report) -> Iterator[str]:
     """Which methods fit a model that has the bench's own equations for some of its effects."""
     shares = grouped(
-        (label, (len(effects), display.effects))
+        (label, share)
         for display in report.description.displays
-        for label, effects in display.modelled.items()
-        if effects and label in report.results.methods(display.name)
+        for label, share in display.modelled.items()
+        if share[0] and label in report.results.methods(display.name)
     )
     ends = {label: [f"{own} of {of}" for own, of in (min(each), max(each))] for label, each in shares.items()}
     known = grouped((" to ".join(dict.fromkeys(both)), label) for label, both in ends.items())

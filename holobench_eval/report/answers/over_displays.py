@@ -48,7 +48,7 @@ def _told(results: Results, each: over.Margin, count: int) -> str:
 
 def _published(results: Results, each: over.Margin) -> str:
     """Where the published margin falls among those of the displays."""
-    score, margin = results.headline, over.published(results, each.label)
+    score, margin = results.headline, over.published(results, each.label, results.conditions[0])
     if margin is None:
         return ""
     above = int((each.values >= margin).sum())
@@ -57,27 +57,25 @@ def _published(results: Results, each: over.Margin) -> str:
 
 def _map(results: Results) -> Iterator[str]:
     """The method that is best on most displays, and whether an error budget of a display tells where another is."""
-    found, score = over.display_map(results), results.headline
-    if found is None:
-        best = over.winners(over.gains(results))
-        usual = max(best, key=best.count)
-        yield f"{usual} is best on {best.count(usual)} of {len(best)}."
-        return
-    count, named = len(found.best), f"{found.hits} of {len(found.best)}"
-    behind, always = score.with_unit(found.cost), score.with_unit(found.usual_cost)
-    if found.cost < found.usual_cost:
-        yield (
-            f"To choose, measure an error budget: it names the best method on {named} displays left out and costs "
-            f"{behind} on average ({found.usual} always: {always})."
-        )
-    else:
-        yield (
-            f"To choose, measure nothing: always taking {found.usual} costs {always} on average. An error budget names "
-            f"the best method on {named} displays left out and costs {behind}."
-        )
-    yield f"{found.usual} is best on {found.best.count(found.usual)} of {count}."
-    asked = [label for label in dict.fromkeys([*subjects(results), found.usual]) if label != found.labels[0]]
-    if shares := [f"{max(found.explained(label), 0):.2f} of {label}" for label in asked]:
+    gained, score = over.gains(results), results.headline
+    best, count = over.winners(gained), len(over.shown_on(results))
+    usual = max(gained, key=best.__getitem__)
+    found = over.display_map(results)
+    if found:
+        behind, always = score.with_unit(found.cost), score.with_unit(found.always(usual))
+        if found.cost < found.always(usual):
+            yield (
+                f"To choose, measure an error budget: it names the best method on {found.hits} of {count} displays "
+                f"left out and costs {behind} on average ({usual} always: {always})."
+            )
+        else:
+            yield (
+                f"To choose, measure nothing: always taking {usual} costs {always} on average. An error budget names "
+                f"the best method on {found.hits} of {count} displays left out and costs {behind}."
+            )
+    yield f"{usual} is best on {best[usual]} of {count}."
+    asked = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.layout.baseline]
+    if found and (shares := [f"{max(found.explained(label), 0):.2f} of {label}" for label in asked]):
         yield (
             f"Its parts ({found.axes[0]}; {found.axes[1]}) predict margins on displays left out: R2 {words(shares)}."
         )

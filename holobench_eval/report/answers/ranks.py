@@ -16,23 +16,14 @@ def verdicts(results: Results) -> Iterator[str]:
     """One a display: who is first, how alike the rankings are, and which methods change places most."""
     found = [each for each in ranks(results) if each.exists]
     if not found:
-        yield "No draw has two methods with a score for every target, so there is no ranking to compare."
+        yield "No draw has two different methods with a score for every target, so there is no ranking to compare."
     for each in found:
         before = f"{each.swept.before}: " * (len(found) > 1)
-        yield f"{before}{_first(each)}; {_agreement(each)}{_turning(each)}."
-
-
-def _first(each: Ranks) -> str:
-    nominal = [label for label, rank in zip(each.methods, each.nominal_positions, strict=True) if rank == 1]
-    return (
-        f"{words(nominal)}, first on {each.swept.before}, is first on {percent(each.first(nominal[0]))} % of its draws"
-    )
-
-
-def _agreement(each: Ranks) -> str:
-    if not len(each.taus):
-        return "all methods score the same"
-    return f"Kendall's tau with its ranking is {bracketed(each.tau, '.2f')}"
+        nominal = [label for label, rank in zip(each.methods, each.nominal_positions, strict=True) if rank == 1]
+        yield (
+            f"{before}{words(nominal)}, first on {each.swept.before}, is first on {percent(each.first(nominal[0]))} % "
+            f"of its draws; Kendall's tau with its ranking is {bracketed(each.tau, '.2f')}{_turning(each)}."
+        )
 
 
 def _turning(each: Ranks) -> str:

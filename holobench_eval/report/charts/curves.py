@@ -112,7 +112,7 @@ def _draw_sweep(axes: Axes, sweep: Sweep) -> None:
         losses = [sweep.loss(label, name) if name != sweep.swept.before else None for _, name in points]
         axes.errorbar(
             positions + (index - (len(sweep.methods) - 1) / 2) * apart,
-            [sweep.mean(label, name).mean for _, name in points],
+            [results.values(label, name).mean() for _, name in points],
             yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in losses]),
             color=looked[label].colour,
             **marks(looked[label], 6.5),

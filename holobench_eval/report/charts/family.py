@@ -43,15 +43,10 @@ def draw_corner(path: Path, parameters: Sequence[Range], rows: Sequence[Row], fi
                         places = [[row[each.name] for row in some] for each in (horizontal, vertical)]
                         panel.scatter(*places, s=area, color=colour, linewidths=0)
                 label = {"fontsize": medium().note, "parse_math": False}
-                if down == count - 1:
-                    panel.set_xlabel(_named(horizontal), **label)
-                else:
-                    panel.set_xticklabels([])
-                if across == 0 and down:
-                    panel.set_ylabel(_named(vertical), **label)
-                elif across:
-                    panel.set_yticklabels([])
+                panel.set_xlabel(_named(horizontal), **label)
+                panel.set_ylabel(_named(vertical) if down else "", **label)
                 panel.tick_params(labelsize=medium().note)
+                panel.label_outer()
         save(figure, path)
 
 

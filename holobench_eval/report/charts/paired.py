@@ -39,8 +39,8 @@ def displays(results: Results) -> list[tuple[str, str]]:
     return [(condition, stem) for condition, stem in slugged if any(_rows(results, condition))]
 
 
-def draw(results: Results, condition: str, path: Path) -> None:
-    """Draw the differences on one of ``displays``, best method first.
+def draw(results: Results, condition: str, path: Path) -> str:
+    """Draw the differences on one of ``displays``, best method first; the caption.
 
     Intervals are those of the paired tests, over clusters of targets (``data.statistics``). The dashed line is the
     constant image, at its mean difference to the baseline.
@@ -51,15 +51,24 @@ def draw(results: Results, condition: str, path: Path) -> None:
     lines = {} if floor is None else {"floor: a constant image": floor}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
+    return (
+        f"{results.headline.axis}{results.layout.text.axis}, on {condition}: differences to the baseline "
+        f"{results.layout.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
+        "their 95 % intervals over clusters of targets, not adjusted for the number of comparisons."
+    )
 
 
-def draw_over_displays(results: Results, path: Path) -> None:
-    """Draw the mean differences of each display, best method first; dashed: differences that were published."""
+def draw_over_displays(results: Results, path: Path) -> str:
+    """Draw the mean differences of each display, best method first; dashed: those that were published. The caption."""
     looked, found = looks(results.names), over_displays.margins(results)
     rows = [Row(each.label, each.values, each.over_both, looked[each.label]) for each in found]
-    known = {f"published for {each.label}": over_displays.published(results, each.label) for each in found}
-    lines = {label: value for label, value in known.items() if value is not None}
+    known = {each.label: over_displays.published(results, each.label, results.conditions[0]) for each in found}
+    lines = {f"published for {label}": value for label, value in known.items() if value is not None}
     _draw(results, path, f"{len(over_displays.shown_on(results))} displays", rows, lines)
+    return (
+        f"Differences to {results.layout.baseline} in {results.headline.axis}. Small dots: displays, at the same "
+        "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets."
+    )
 
 
 def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
@@ -83,23 +92,6 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
         axes.set_xlabel(axis, parse_math=False)
         legend_below(figure, *axes.get_legend_handles_labels())
         save(figure, path)
-
-
-def caption_over_displays(results: Results) -> str:
-    """What the chart over displays shows."""
-    return (
-        f"Differences to {results.layout.baseline} in {results.headline.axis}. Small dots: displays, at the same "
-        "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets."
-    )
-
-
-def caption(results: Results, condition: str) -> str:
-    """What the chart of a display shows."""
-    return (
-        f"{results.headline.axis}{results.layout.text.axis}, on {condition}: differences to the baseline "
-        f"{results.layout.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
-        "their 95 % intervals over clusters of targets, not adjusted for the number of comparisons."
-    )
 
 
 def _rows(results: Results, condition: str) -> Iterator[Row]:

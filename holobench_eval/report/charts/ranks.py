@@ -64,9 +64,6 @@ def _shares(axes: Axes, ranks: Ranks) -> None:
 
 
 def _agreement(axes: Axes, ranks: Ranks) -> None:
-    if not len(ranks.taus):
-        axes.set_axis_off()
-        return
     mean, step = ranks.tau, max(NARROWEST, 4 / (len(ranks.methods) * (len(ranks.methods) - 1)))
     steps, draws = np.unique(((1 - ranks.taus) / step).round(), return_counts=True)
     axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=PALE)

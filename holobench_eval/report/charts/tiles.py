@@ -33,23 +33,10 @@ from ..data.tables import DONE
 from .style import new_figure, save_picture, style
 
 Picture = NDArray[np.float64]
+Window = tuple[slice, slice]  # rows and columns of a picture
 T = TypeVar("T")
 
 CROP_FRACTION = 9  # of a side of the picture: four times enlarged, two windows fit below it
-
-
-@dataclass(frozen=True)
-class Crop:
-    """A window of a picture, in pixels."""
-
-    top: int
-    left: int
-    height: int
-    width: int
-
-    def of(self, picture: Picture) -> Picture:
-        """The window of ``picture`` ``(h, w, 3)``; a view."""
-        return picture[self.top : self.top + self.height, self.left : self.left + self.width]
 
 
 @dataclass(frozen=True)
@@ -58,6 +45,9 @@ class Tile:
 
     picture: Picture | None
     note: str
+
+
+Row = tuple[str, Sequence[tuple[str, Tile]]]  # a method, and its captures by headings that are alike in all rows
 
 
 def load_picture(path: Path) -> Picture | None:
@@ -72,7 +62,7 @@ def load_picture(path: Path) -> Picture | None:
     return picture
 
 
-def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Crop:
+def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Window:
     """The window of ``target`` with the largest summed gradient magnitude; the first one where windows tie.
 
     fraction: how many times smaller than the picture's its sides are.
@@ -84,8 +74,8 @@ def most_detailed(target: Picture, fraction: int = CROP_FRACTION) -> Crop:
     summed = np.pad(detail.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     windows = summed[rows:, columns:] - summed[:-rows, columns:] - summed[rows:, :-columns] + summed[:-rows, :-columns]
     # Six decimals: summation order must not decide between equal windows.
-    top, left = np.unravel_index(int(np.argmax(np.round(windows, 6))), windows.shape)
-    return Crop(int(top), int(left), rows, columns)
+    top, left = map(int, np.unravel_index(int(np.argmax(np.round(windows, 6))), windows.shape))
+    return np.s_[top : top + rows, left : left + columns]
 
 
 def error_map(capture: Picture, target: Picture) -> NDArray[np.float64]:
@@ -159,10 +149,8 @@ class Thumbnails:
     def by_quality(self, condition: str) -> list[str]:
         """The targets that have a picture, from worst to best by their mean over methods."""
         results = self.results
-        values = np.vstack([results.values(label, condition) for label in results.methods(condition)])
-        known = np.isfinite(values)
-        means = np.where(known, values, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-        quality = dict(zip(results.targets, results.headline.sign * means, strict=True))
+        values = pd.DataFrame([results.values(label, condition) for label in results.methods(condition)])
+        quality = dict(zip(results.targets, results.headline.sign * values.mean().fillna(0.0), strict=True))
         return sorted(self.targets(condition), key=lambda target: quality[target])
 
     def middle(self, condition: str) -> str:
@@ -186,36 +174,28 @@ CHARACTER = 6.6  # width in pixels of an average character of the captions
 LARGEST_TILE = 224  # pixels; of wider pictures a window is drawn, half as wide and high
 
 
-@dataclass(frozen=True)
-class Row:
-    """A method's captures. tiles: (heading, capture), headings alike in all rows."""
-
-    label: str
-    tiles: tuple[tuple[str, Tile], ...]
-
-
 def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequence[Row]) -> None:
     """Draw the rows, the target ``(h, w, 3)`` to the left of the first. Nothing is drawn without rows."""
     if not rows:
         return
     name, picture = target
-    window = most_detailed(picture, 2) if picture.shape[1] > LARGEST_TILE else Crop(0, 0, *picture.shape[:2])
-    tall, wide = tile_size(window.of(picture).shape)
-    columns = 1 + max(len(row.tiles) for row in rows)
+    window = most_detailed(picture, 2) if picture.shape[1] > LARGEST_TILE else np.s_[:, :]
+    tall, wide = tile_size(picture[window].shape)
+    columns = 1 + max(len(tiles) for _, tiles in rows)
     with style():
         page = Page(SIDE + columns * (wide + GAP), HEADER + len(rows) * (tall + CAPTION + GAP))
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
         page.text(SIDE + wide / 2, HEADER - 4, f"target: {name}", ha="center", va="bottom")
-        page.paste(SIDE, HEADER, (tall, wide), window.of(picture))
-        for index, row in enumerate(rows):
+        page.paste(SIDE, HEADER, (tall, wide), picture[window])
+        for index, (method, tiles) in enumerate(rows):
             top = HEADER + index * (tall + CAPTION + GAP)
-            label = textwrap.shorten(row.label, int(tall / CHARACTER), placeholder="...")
+            label = textwrap.shorten(method, int(tall / CHARACTER), placeholder="...")
             page.text(SIDE - 8, top + tall / 2, label, rotation=90, ha="right", va="center")
-            for column, (heading, tile) in enumerate(row.tiles, start=1):
+            for column, (heading, tile) in enumerate(tiles, start=1):
                 left = SIDE + column * (wide + GAP)
                 if index == 0:
                     page.text(left + wide / 2, HEADER - 4, heading, ha="center", va="bottom")
-                shown = tile if tile.picture is None else replace(tile, picture=window.of(tile.picture))
+                shown = tile if tile.picture is None else replace(tile, picture=tile.picture[window])
                 page.tile(left, top, (tall, wide), shown)
         page.save(path)
 
@@ -269,70 +249,39 @@ FOOTER = 74
 ERROR_COLOURS = "magma"
 
 
-def outline(pixels: Picture, left: int, top: int, size: tuple[int, int]) -> None:
-    """A white frame between black ones, seen on any picture."""
-    for inset, value in ((0, 0.0), (1, 1.0), (2, 1.0), (3, 0.0)):
-        inside = pixels[top + inset : top + size[0] - inset, left + inset : left + size[1] - inset]
-        inside[[0, -1], :] = value
-        inside[:, [0, -1]] = value
+def draw_comparison(path: Path, title: str, target: Picture, columns: Sequence[tuple[str, str, Picture]]) -> None:
+    """Draw one page of captures.
 
-
-def draw_comparison(
-    path: Path, title: str, target: Picture, columns: Sequence[tuple[str, Tile]], error_scale: float
-) -> None:
-    """Draw one page.
-
-    target: ``(h, w, 3)`` sRGB in [0, 1]; columns: heading and capture; error_scale: upper end of the colour bar of the
-    error maps, sRGB value.
+    target: ``(h, w, 3)`` sRGB in [0, 1]; columns: heading, note and capture.
     """
     tall, wide = tile_size(target.shape)
-    scale = Normalize(0, error_scale)
+    window, factor = most_detailed(target), wide // target.shape[1]
+    zoomed = tuple(ZOOM * factor * size for size in target[window].shape[:2])
+    below = HEADER + tall + CAPTION
+    scale = Normalize(0, error_limit([error_map(capture, target) for *_, capture in columns]))
     with style():
-        height = HEADER + tall + CAPTION + zoomed(target.shape)[0] + 2 * GAP + FOOTER
-        page = Page(SIDE + (1 + len(columns)) * (wide + GAP), height)
+        page = Page(SIDE + (1 + len(columns)) * (wide + GAP), below + zoomed[0] + 2 * GAP + FOOTER)
         page.text(SIDE, 14, title, fontsize=9, weight="bold", va="center")
-        for index, heading in enumerate(["target", *(name for name, _ in columns)]):
+        for index, (heading, note, picture) in enumerate(
+            [("target", f"frame: {ZOOM} x enlarged below", target), *columns]
+        ):
+            left = SIDE + index * (wide + GAP)
             words = "\n".join(textwrap.wrap(heading, int(wide / CHARACTER), max_lines=2, placeholder="..."))
-            page.text(SIDE + index * (wide + GAP) + wide / 2, HEADER - 4, words, ha="center", va="bottom")
-        _draw_target(page, (SIDE, HEADER), target)
-        for index, (_, tile) in enumerate(columns, start=1):
-            _draw_tile(page, (SIDE + index * (wide + GAP), HEADER), tile, target, scale)
+            page.text(left + wide / 2, HEADER - 4, words, ha="center", va="bottom")
+            page.tile(left, HEADER, (tall, wide), Tile(picture, note))
+            page.paste(left, below, zoomed, picture[window])
+            if index:
+                error = scale(error_map(picture[window], target[window]))
+                colours = np.asarray(matplotlib.colormaps[ERROR_COLOURS](error))[..., :3]
+                page.paste(left + wide - zoomed[1], below, zoomed, colours)
+        # A white frame between black ones, seen on any picture.
+        top, bottom = (HEADER + factor * row for row in (window[0].start, window[0].stop))
+        left, right = (SIDE + factor * column for column in (window[1].start, window[1].stop))
+        for inset, value in enumerate((0.0, 1.0, 1.0, 0.0)):
+            inside = page.pixels[top + inset : bottom - inset, left + inset : right - inset]
+            inside[[0, -1], :] = inside[:, [0, -1]] = value
         _colour_bar(page, scale)
         page.save(path)
-
-
-def zoomed(shape: tuple[int, ...]) -> tuple[int, int]:
-    """(height, width) in figure pixels of the enlarged window of a capture of ``shape`` (h, w, ...)."""
-    tall, wide = tile_size(shape)
-    return tall // shape[0] * ZOOM * (shape[0] // CROP_FRACTION), wide // shape[1] * ZOOM * (shape[1] // CROP_FRACTION)
-
-
-def _draw_target(page: Page, corner: tuple[int, int], target: Picture) -> None:
-    """The target, with a frame around the window that all tiles of its row enlarge."""
-    left, top = corner
-    tall, wide = tile_size(target.shape)
-    page.paste(left, top, (tall, wide), target)
-    words = f"frame: {ZOOM} x enlarged below"
-    page.text(left + wide / 2, top + tall + CAPTION / 2, words, fontsize=8, ha="center", va="center")
-    crop, factor = most_detailed(target), wide // target.shape[1]
-    page.paste(left, top + tall + CAPTION, zoomed(target.shape), crop.of(target))
-    outline(
-        page.pixels, left + crop.left * factor, top + crop.top * factor, (crop.height * factor, crop.width * factor)
-    )
-
-
-def _draw_tile(page: Page, corner: tuple[int, int], tile: Tile, target: Picture, scale: Normalize) -> None:
-    """A capture, its caption, the enlarged window and the error in it; or why there is no capture."""
-    left, top = corner
-    tall, wide = tile_size(target.shape)
-    page.tile(left, top, (tall, wide), tile)
-    if tile.picture is None:
-        return
-    below, size, crop = top + tall + CAPTION, zoomed(target.shape), most_detailed(target)
-    page.paste(left, below, size, crop.of(tile.picture))
-    error = error_map(crop.of(tile.picture), crop.of(target))
-    coloured = np.asarray(matplotlib.colormaps[ERROR_COLOURS](scale(error)))[..., :3]
-    page.paste(left + wide - size[1], below, size, coloured)
 
 
 def _colour_bar(page: Page, scale: Normalize) -> None:

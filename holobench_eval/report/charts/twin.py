@@ -6,50 +6,33 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from torch import Tensor
 
 from ...optics.colour import srgb_encode
 from .look.medium import medium
 from .look.methods import Look
-from .style import GREY, PALE, grid, laid_out, save, save_picture, style, without_math
+from .style import GREY, PALE, grid, laid_out, save, style, without_math
+from .tiles import Picture, Tile, draw_rows
 
-SIDE, FRAME = 250, 90  # pixels: of a picture, around all
 LOUDER = 4.0  # factor of differences
-
-Picture = NDArray[np.float32]
-
-
-def draw_twin_pictures(path: Path, rows: Mapping[str, tuple[Picture, Picture, Picture]]) -> None:
-    """Draw photographs ``(C, h, w)`` in [0, 1], second photographs and captures of the twin, a row a method, and the
-    differences of both to the first."""
-    titles = (
-        "photograph", "capture of the twin", f"difference to the twin, x {LOUDER:g}",
-        f"of two photographs, x {LOUDER:g}",
-    )  # fmt: skip
-    with style():
-        width, height = (SIDE * len(each) + FRAME for each in (titles, rows))
-        figure, panels = laid_out(width, height, len(rows), len(titles))
-        for line, (label, (first, second, twin)) in zip(panels, rows.items(), strict=True):
-            shown = (first, twin, LOUDER * np.abs(twin - first), LOUDER * np.abs(second - first))
-            for axes, title, picture in zip(line, titles, shown, strict=True):
-                _show(axes, picture)
-                if axes in panels[0]:
-                    axes.set_title(title, fontsize=medium().note)
-            line[0].set_ylabel(label, parse_math=False)
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
-        save_picture(np.ascontiguousarray(pixels), path)
+TITLES = ("photograph", "capture of the twin", f"difference, x {LOUDER:g}", f"of two photographs, x {LOUDER:g}")
 
 
-def _show(axes: Axes, picture: Picture) -> None:
-    import torch
+def draw_twin_pictures(
+    path: Path, title: str, target: tuple[str, Tensor], rows: Mapping[str, tuple[Tensor, Tensor, Tensor]]
+) -> None:
+    """Draw a target ``(C, h, w)`` in [0, 1] by its name, and beside it photographs, captures of the twin, and the
+    differences of those and of second photographs to the first; rows: photograph, second one and capture by method."""
+    drawn = []
+    for label, (first, second, twin) in rows.items():
+        shown = (first, twin, LOUDER * (twin - first).abs(), LOUDER * (second - first).abs())
+        drawn.append((label, [(name, Tile(_seen(each), "")) for name, each in zip(TITLES, shown, strict=True)]))
+    draw_rows(path, title, (target[0], _seen(target[1])), drawn)
 
-    light = srgb_encode(torch.from_numpy(np.clip(picture, 0, 1))).numpy()
-    image = np.moveaxis(np.repeat(light, 3, 0) if len(light) == 1 else light, 0, -1)
-    axes.imshow(image, interpolation="nearest")
-    axes.set(xticks=[], yticks=[])
-    axes.spines[:].set_visible(False)
+
+def _seen(light: Tensor) -> Picture:
+    return srgb_encode(light.clamp(0, 1)).expand(3, -1, -1).permute(1, 2, 0).double().numpy()
 
 
 def draw_twin_scores(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,24 +27,16 @@ class Part:
     rows: list[dict[str, str]]
 
 
-def parts(comparison: Comparison) -> Iterator[Part]:
+def parts(comparison: Comparison) -> list[Part]:
     """The tables of a comparison, the differences first."""
-    yield _differences(comparison)
-    yield _targets(comparison)
-    yield _unpaired(comparison)
-    yield _provenance(comparison)
+    return [table(comparison) for table in (_differences, _targets, _unpaired, _provenance)]
 
 
 def markdown(comparison: Comparison) -> str:
     """The text of compare.md."""
     title = heading(Markdown("{} and {}").format(comparison.a.folder.name, comparison.b.folder.name), level=1)
-    return f"{blocks([title, *(block for part in parts(comparison) for block in _markdown(part))])}\n"
-
-
-def _markdown(part: Part) -> Iterator[object]:
-    yield heading(part.title)
-    yield part.sentence
-    yield table_of(part.rows)
+    tables = ((heading(part.title), part.sentence, table_of(part.rows)) for part in parts(comparison))
+    return f"{blocks(itertools.chain([title], *tables))}\n"
 
 
 def csv(comparison: Comparison) -> str:
@@ -73,10 +66,7 @@ def csv(comparison: Comparison) -> str:
 
 def _differences(comparison: Comparison) -> Part:
     score, rows = comparison.score, comparison.rows
-    counts = {
-        verdict: sum(row.verdict == verdict for row in rows) for verdict in dict.fromkeys(r.verdict for r in rows)
-    }
-    found = words([f"{count} {verdict}" for verdict, count in counts.items()])
+    found = words([f"{count} {verdict}" for verdict, count in Counter(row.verdict for row in rows).items()])
     changed = [row for row in rows if row.verdict != EQUAL]
     unlisted = ", in which no target has changed and which are not listed" if len(changed) < len(rows) else ""
     same = "all" if comparison.unchanged == comparison.cells else f"{comparison.unchanged}"

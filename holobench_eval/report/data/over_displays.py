@@ -8,16 +8,17 @@ to. So it is told whether the shares name the best method of a display, and what
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...metrics import control
 from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
 from .error_budget import budgets
 from .results import Results
+from .scores import Score
 from .statistics import FEWEST_DISPLAYS, Array, Estimate, two_way
 
 
@@ -89,15 +90,15 @@ def gains(results: Results) -> dict[str, Array]:
     return {str(results.layout.baseline): np.zeros(len(shown_on(results))), **rows}
 
 
-def winners(gained: Mapping[str, Array]) -> list[str]:
-    """The best method on each display."""
-    return [list(gained)[index] for index in np.stack(list(gained.values())).argmax(0)]
+def winners(gained: Mapping[str, Array]) -> Counter[str]:
+    """On how many displays each method is the best."""
+    return Counter(list(gained)[index] for index in np.stack(list(gained.values())).argmax(0))
 
 
-def published(results: Results, label: str) -> float | None:
-    """The margin of two published figures, where a method and the baseline have one."""
+def published(results: Results, label: str, condition: str) -> float | None:
+    """The margin of two published figures beside a display, where a method and the baseline have one."""
     names, metric = (label, str(results.layout.baseline)), results.headline.metric
-    own, other = (results.layout.published(name, results.conditions[0]).get(metric) for name in names)
+    own, other = (results.layout.published(name, condition).get(metric) for name in names)
     return None if own is None or other is None else own - other
 
 
@@ -130,16 +131,6 @@ class Map:
     predicted: Array
 
     @property
-    def best(self) -> list[str]:
-        """On each display."""
-        return winners(dict(zip(self.labels, self.margins, strict=True)))
-
-    @property
-    def usual(self) -> str:
-        """The method that is best on most displays."""
-        return max(self.labels, key=self.best.count)
-
-    @property
     def hits(self) -> int:
         """Displays whose best method the shares name."""
         return int((self.predicted.argmax(0) == self.margins.argmax(0)).sum())
@@ -150,10 +141,9 @@ class Map:
         chosen = np.take_along_axis(self.margins, self.predicted.argmax(0)[None], 0)
         return float((self.margins.max(0) - chosen).mean())
 
-    @property
-    def usual_cost(self) -> float:
-        """The same of the usual method."""
-        return float((self.margins.max(0) - self.margins[self.labels.index(self.usual)]).mean())
+    def always(self, label: str) -> float:
+        """The same of one method."""
+        return float((self.margins.max(0) - self.margins[self.labels.index(label)]).mean())
 
     def explained(self, label: str) -> float:
         """The share of the variance of a method's margin over displays that the lines predict (R2, leaving one out); 0
@@ -208,16 +198,16 @@ def judged(results: Results) -> list[Judged]:
     found = {each.label: each for each in margins(results)}
     for other in results.related.values():
         if other.layout.measure == "prediction" and other.control:
-            return [_judged(results, other, found, key) for key in (control.NAME, other.headline.key)]
+            return [_judged(results, other, found, score) for score in (*other.control, other.headline)]
     return []
 
 
-def _judged(results: Results, other: Results, found: dict[str, Margin], key: str) -> Judged:
-    right, pairs = 0, 0
+def _judged(results: Results, other: Results, found: dict[str, Margin], score: Score) -> Judged:
+    right, pairs, key = 0, 0, score.key
     for place, name in enumerate(shown_on(results)):
         both = [label for label in other.methods(name) if label in found and other.is_complete(label, name, key)]
         for first, second in itertools.combinations(both, 2):
             margin = results.headline.sign * (found[first].values - found[second].values)[place]
             model = other.values(first, name, key).mean() - other.values(second, name, key).mean()
             right, pairs = right + bool(margin * model > 0), pairs + 1
-    return Judged(next(score.title for score in other.scores if score.key == key), right, pairs)
+    return Judged(score.title, right, pairs)

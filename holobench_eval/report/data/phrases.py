@@ -39,11 +39,8 @@ def verdict(score: Score, test: PairedTest) -> str:
 
 def tested(results: Results, label: str, condition: str) -> PairedTest | None:
     """The comparison of a method with the baseline on a display; None where there is no complete pair of rows."""
-    if results.gain(label, condition) is None:
-        return None
-    return next(
-        (test for test in results.against_baseline if (test.condition, test.second) == (condition, label)), None
-    )
+    both = (label, str(results.layout.baseline))
+    return results.tests.get((label, condition)) if all(results.is_complete(name, condition) for name in both) else None
 
 
 def value(results: Results, label: str, condition: str) -> str:

@@ -73,25 +73,16 @@ class Ranks:
         kept = [label for label in map(str, known) if known[label].iloc[0] and enough[label]]
         return sorted(kept, key=lambda label: -self.quality[label].iloc[0])
 
-    @property
-    def _known(self) -> pd.DataFrame:
-        """Which ranked method has a value for every target, a row a draw."""
-        return self.quality[self.methods][1:].map(np.isfinite)
-
     @cached_property
     def used(self) -> list[int]:
         """Indices of the draws in which every ranked method has a value for every target."""
-        return np.flatnonzero(self._known.all(axis=1)).tolist() if self.methods else []
-
-    @property
-    def empty(self) -> list[int]:
-        """Indices of the draws in which no ranked method has a value for every target."""
-        return np.flatnonzero(~self._known.any(axis=1)).tolist()
+        known = np.isfinite(self.quality[self.methods][1:])
+        return np.flatnonzero(known.all(axis=1)).tolist() if self.methods else []
 
     @property
     def exists(self) -> bool:
-        """Whether there is a ranking: two methods and a draw."""
-        return len(self.methods) > 1 and bool(self.used)
+        """Whether there is a ranking: two methods that differ, and a draw."""
+        return len(self.methods) > 1 and len(self.taus) > 0
 
     @cached_property
     def nominal(self) -> Array:

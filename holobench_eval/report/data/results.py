@@ -221,6 +221,11 @@ class Results:
             for (condition, label, found), value in zip(rows, p, strict=True)
         ]
 
+    @cached_property
+    def tests(self) -> dict[tuple[str, str], PairedTest]:
+        """``against_baseline`` by (method, condition)."""
+        return {(test.second, test.condition): test for test in self.against_baseline}
+
     def floor(self, condition: str, less: Array | float = 0.0) -> float | None:
         """The mean of a constant image under ``condition``, less other values of the targets; of those that have both.
         None where there are none."""

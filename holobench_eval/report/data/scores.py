@@ -12,6 +12,7 @@ import pandas as pd
 
 from ...metrics.catalogue import catalogue
 from .statistics import Estimate
+from .text import bracketed
 
 DOMAINS = ("linear", "amplitude", "srgb", "stored")
 DOMAIN_NAMES = {"linear": "linear light", "amplitude": "amplitude", "srgb": "sRGB", "stored": "values as stored"}
@@ -108,22 +109,19 @@ class Score:
 
     def with_unit(self, value: float, signed: bool = False) -> str:
         """The value with the metric's digits and unit: ``17.62 dB``, ``0.475``, ``+1.20 dB``."""
-        return f"{self.number(value, signed)}{f' {self.unit}' if self.unit else ''}"
+        return f"{self.number(value, signed)} {self.unit}".rstrip()
 
     def number(self, value: float, signed: bool = False) -> str:
         """The value with the metric's digits; a dash for NaN."""
-        if np.isnan(value):
-            return "–"
-        digits = METRICS[self.metric].digits if self.metric in METRICS else 3
-        return f"{value:{'+' if signed else ''}z.{digits}f}"
+        return "–" if np.isnan(value) else f"{value:{self._form(signed)}}"
+
+    def _form(self, signed: bool) -> str:
+        """How its numbers are formatted."""
+        return f"{'+' if signed else ''}z.{METRICS[self.metric].digits if self.metric in METRICS else 3}f"
 
     def estimate(self, estimate: Estimate | None, signed: bool = False, unit: bool = False) -> str:
         """``17.62 [16.90, 18.31]``; the mean alone where there is no interval, a dash for None. unit: of the mean."""
-        if estimate is None:
-            return "–"
-        mean = (self.with_unit if unit else self.number)(estimate.mean, signed)
-        low, high = (self.number(value, signed) for value in (estimate.low, estimate.high))
-        return mean if np.isnan(estimate.low) else f"{mean} [{low}, {high}]"
+        return bracketed(estimate, self._form(signed), unit=f" {self.unit}".rstrip() if unit else "")
 
     def in_row(self, row: pd.Series) -> str:
         """Mean and interval of the score in a row of the table."""

@@ -42,6 +42,11 @@ class Estimate:
     clusters: int
 
     @property
+    def has_interval(self) -> bool:
+        """Whether there is one."""
+        return not np.isnan(self.low)
+
+    @property
     def is_clear(self) -> bool:
         """Whether the interval lies on one side of zero; of one comparison, not adjusted for others."""
         return self.low > 0 or self.high < 0

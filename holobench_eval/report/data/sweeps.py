@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...display.simulated.changes import KINDS, Kind
 from .layout import Swept
 from .results import Results
-from .statistics import Array, Estimate, mean_interval, ratio_interval
+from .statistics import Estimate, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 
@@ -52,20 +54,12 @@ class Sweep:
         rows = [self.results.methods(condition) for _, condition in self.points]
         return [label for label in rows[0] if all(label in others for others in rows)]
 
-    def mean(self, label: str, condition: str) -> Estimate:
-        """Headline score under a condition."""
-        return mean_interval(self.results.values(label, condition), self.results.clusters)
-
     def loss(self, label: str, condition: str) -> Estimate | None:
         """What the change cost, target by target, positive where the score got worse; None without a complete pair of
         rows."""
-        if not all(self.results.is_complete(label, name) for name in (self.swept.before, condition)):
-            return None
-        return self.results.estimate(self._lost(label, condition))
-
-    def _lost(self, label: str, condition: str) -> Array:
-        values = self.results.values
-        return self.results.headline.sign * (values(label, self.swept.before) - values(label, condition))
+        before, after = (self.results.values(label, name) for name in (self.swept.before, condition))
+        lost = self.results.headline.sign * (before - after)
+        return None if np.isnan(lost).any() else self.results.estimate(lost)
 
     def losses(self, label: str) -> dict[str, Estimate]:
         """What every change cost, by condition; without those that lack a target."""
@@ -108,15 +102,13 @@ class Sweep:
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
         """Share of each loss that is got back under the same value of another kind, by value; of a loss that is small,
         or not clear, no share is told."""
-        shares = {}
-        same = dict(remedy.swept.points)
+        shares, cures = {}, {value: name for value, name in remedy.swept.points if name in remedy.losses(label)}
         for value, condition in self.swept.points:
-            if value in same:
-                lost, left = self.loss(label, condition), remedy.loss(label, same[value])
-                if lost is not None and left is not None and lost.mean > SMALL and not lost.low <= 0:
-                    before = self.results.values(label, self.swept.before)
-                    blurred, cured = (self.results.values(label, name) for name in (condition, same[value]))
-                    shares[str(value)] = ratio_interval(cured - blurred, before - blurred, self.results.clusters)
+            lost = self.loss(label, condition)
+            if value in cures and lost is not None and lost.mean > SMALL and not lost.low <= 0:
+                names = (self.swept.before, condition, cures[value])
+                before, blurred, cured = (self.results.values(label, name) for name in names)
+                shares[str(value)] = ratio_interval(cured - blurred, before - blurred, self.results.clusters)
         return shares
 
 

@@ -60,22 +60,18 @@ def sample(estimate: Estimate, total: int) -> str:
     return f"{estimate.n} of {total} targets{among}"
 
 
-def bracketed(estimate: Estimate | None, form: str, scale: float = 1.0) -> str:
-    """A mean with its interval, where there is one, scaled and as numbers of a form; a dash for None."""
-    if estimate is None:
-        return "–"
+def bracketed(estimate: Estimate | None, form: str, scale: float = 1.0, unit: str = "") -> str:
+    """A mean with its interval, where there is one, scaled and as numbers of a form; a dash for None and NaN. unit: of
+    the mean."""
+    if estimate is None or math.isnan(estimate.mean):
+        return f"–{unit if estimate else ''}"
     mean, low, high = (f"{scale * value:{form}}" for value in (estimate.mean, estimate.low, estimate.high))
-    return mean if math.isnan(estimate.low) else f"{mean} [{low}, {high}]"
+    return f"{mean}{unit} [{low}, {high}]" if estimate.has_interval else f"{mean}{unit}"
 
 
 def percent(estimate: Estimate | None) -> str:
     """A share in percent."""
     return bracketed(estimate, "z.0f", 100)
-
-
-def p_value(p: float) -> str:
-    """``p = 0.031`` or ``p < 0.001``."""
-    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Estimate
 from ..data.tables import to_json
-from ..data.text import number, p_value
+from ..data.text import number
 from ..section import Report
 
 Json = dict[str, Any]
@@ -29,7 +29,7 @@ def page_data(report: Report) -> Json:
     results, text = report.results, report.results.layout.text
     tiers = {display.name: {row.label: row.tier for row in display.rows} for display in board(results).displays}
     tiers |= {name: dict.fromkeys(results.methods(name), "") for name in results.changed}
-    colours = looks(results.names)
+    colours, column = looks(results.names), results.headline.column
     return {
         "headline": _score(results.headline),
         "baseline": results.layout.baseline,
@@ -60,7 +60,6 @@ def page_data(report: Report) -> Json:
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
-            for column in [results.headline.column]
             for name in results.conditions
         },
         "magma": colormaps["magma"](range(256), bytes=True)[:, :3].tolist(),
@@ -100,7 +99,7 @@ def _row(results: Results, label: str, condition: str, tier: str) -> Json:
     if gain is not None and label != results.layout.baseline:
         cells[GAIN] = _estimate(results.headline, gain, signed=True)
     if test and not math.isnan(test.p):
-        cells[P] = _cell(p_value(test.p).removeprefix("p ").removeprefix("= "), test.p)
+        cells[P] = _cell("< 0.001" if test.p < 0.001 else f"{test.p:.3f}", test.p)
     cells |= {key: _cell(number(row[key]), row[key]) for key in costs(results.table, "")}
     return {
         "method": label,

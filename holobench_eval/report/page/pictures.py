@@ -52,7 +52,7 @@ def pictures(report: Report, room: int) -> tuple[dict[Cell, bytes], Json]:
     the oracle on every display; then the same on the changed displays, for the first targets only. A target's pictures
     come all or not.
     """
-    everything = files(report, planned(report))
+    everything = files(report)
     some = ({cell: everything[cell] for cell in wanted if cell in everything} for wanted in groups(report))
     chosen = _fitting(itertools.chain([everything], some), room, Path, _base64_length)
     found = {cell: path.read_bytes() for cell, path in chosen.items()}
@@ -122,27 +122,18 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
             yield str(label), condition, target
 
 
-def planned(report: Report) -> Iterator[Cell]:
-    """The captures that a report could show."""
-    results = report.results
-    shown = _pictured(results, [*results.conditions, *results.changed])
-    for condition, target in itertools.product(shown, results.targets):
-        yield from ((label, condition, target) for label in results.methods(condition))
-
-
 def _pictured(results: Results, conditions: Iterable[str]) -> list[str]:
     return [name for name in conditions if results.has_pictures(name)]
 
 
-def files(report: Report, cells: Iterator[Cell]) -> dict[Cell, Path]:
+def files(report: Report) -> dict[Cell, Path]:
     """The files of targets and captures that are there: of a capture that of the first repeat with a score."""
-    thumbnails, done = report.thumbnails, report.results.done.drop_duplicates(["label", "condition", "target"])
-    names = zip(done["label"], done["condition"], done["target"], strict=True)
-    captures = dict(zip(names, done["cell"], strict=True))
-    paths = {cell: thumbnails.of_capture(captures[cell]) for cell in cells if cell in captures}
-    truths = (cell for target in report.results.targets for cell in _truths(report, target))
-    shape = report.results.shape
-    targets = {cell: thumbnails.of_target(cell[2], shape(cell[1])) for cell in truths}
+    results, thumbnails = report.results, report.thumbnails
+    shown = results.done[results.done["condition"].isin(_pictured(results, [*results.conditions, *results.changed]))]
+    cells = shown.drop_duplicates(["label", "condition", "target"])[["label", "condition", "target", "cell"]]
+    paths = {(label, name, target): thumbnails.of_capture(cell) for label, name, target, cell in cells.to_numpy()}
+    truths = (cell for target in results.targets for cell in _truths(report, target))
+    targets = {cell: thumbnails.of_target(cell[2], results.shape(cell[1])) for cell in truths}
     return {cell: path for cell, path in (targets | paths).items() if path.is_file()}
 
 
@@ -155,7 +146,7 @@ def keep_copies(report: Report) -> None:
     is_ours = not folder.exists() or ((folder / MARK).is_file() and (folder / MARK).read_bytes() == SAYS)
     if not report.thumbnails.store.folder.is_dir() or not is_ours:
         return
-    known = files(report, planned(report))
+    known = files(report)
     by_target = ([cell for cell in known if cell[2] == target] for target in report.results.targets)
     wanted = (
         {known[cell].stem: known[cell] for cell in group if cell in known} for group in [*groups(report), *by_target]

@@ -14,7 +14,7 @@ from ..charts.curves import draw_costs
 from ..charts.error_budget import draw_budgets
 from ..charts.family import draw_map
 from ..charts.look.methods import looks
-from ..charts.tiles import Row, draw_rows
+from ..charts.tiles import draw_rows
 from ..data import over_displays
 from ..data.board import board
 from ..data.error_budget import budgets
@@ -34,8 +34,7 @@ def _plot(report: Report) -> Iterator[tuple[Path, str]]:
     """Differences to the baseline over many displays, or else on the first display that has any."""
     if over_displays.applies(report.results) and over_displays.shown_on(report.results):
         path = report.figures / "quality-displays.png"
-        paired.draw_over_displays(report.results, path)
-        yield path, paired.caption_over_displays(report.results)
+        yield path, paired.draw_over_displays(report.results, path)
         yield from _map(report)
         return
     yield from _paired(report, slice(1))
@@ -51,8 +50,7 @@ def _paired(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
     """The differences on some of the displays that have any."""
     for condition, stem in paired.displays(report.results)[some]:
         path = report.figures / f"quality-paired-{stem}.png"
-        paired.draw(report.results, condition, path)
-        yield path, paired.caption(report.results, condition)
+        yield path, paired.draw(report.results, condition, path)
 
 
 def _map(report: Report) -> Iterator[tuple[Path, str]]:
@@ -90,7 +88,7 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     if any(tile.picture is not None for _, tile in tiles):
         path, text = report.figures / PICTURES, report.layout.text
         middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
-        draw_rows(path, f"{condition}", (target, thumbnails.targets(condition)[target]), [Row("", tuple(tiles))])
+        draw_rows(path, f"{condition}", (target, thumbnails.targets(condition)[target]), [("", tiles)])
         yield (
             path,
             f"{text.scored.capitalize()}s of {target}{middle}, on {condition}. {text.picture}. Left: the {text.truth}.",

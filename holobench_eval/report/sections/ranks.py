@@ -65,22 +65,14 @@ def left_out(ranks: Ranks) -> list[str]:
             "Not ranked, because targets are missing on the nominal display or in more than half of the draws: "
             f"{words(unranked)}."
         )
-    empty = set(ranks.empty)
-    partly = [index for index in range(len(ranks.swept.points)) if index not in empty and index not in ranks.used]
-    if empty and ranks.used:
+    left = [str(value) for index, (value, _) in enumerate(ranks.swept.points) if index not in ranks.used]
+    if left and ranks.used:
+        which = f"Draws {words(left)} are" if len(left) > 1 else f"Draw {left[0]} is"
         lines.append(
-            f"{_draws(ranks, sorted(empty))}: no ranked method has a score for every target there, as where the camera "
-            "cannot be registered (see Holes). The results hold for benches on which it can be registered."
+            f"{which} left out ({len(left)} of {len(ranks.swept.points)}): a ranked method lacks a target there (see "
+            "Holes), as every method does where the camera cannot be registered."
         )
-    if partly and ranks.used:
-        lines.append(f"{_draws(ranks, partly)}: a ranked method lacks a target there.")
     return lines
-
-
-def _draws(ranks: Ranks, indices: Sequence[int]) -> str:
-    numbers = [str(ranks.swept.points[index][0]) for index in indices]
-    which = f"Draws {words(numbers)} are" if len(numbers) > 1 else f"Draw {numbers[0]} is"
-    return f"{which} left out ({len(numbers)} of {len(ranks.swept.points)})"
 
 
 def _ranges(ranks: Ranks) -> Markdown | None:
@@ -104,20 +96,12 @@ def draw(rankings: Sequence[Ranks], folder: Path) -> Iterator[tuple[Path, str]]:
     for ranks in existing:
         path = folder / f"quality-ranks-{stems[ranks.swept.before]}.png"
         draw_ranks(path, ranks)
-        yield path, _caption(ranks)
-
-
-def _caption(ranks: Ranks) -> str:
-    left = (
-        f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in which "
-        "a method has each rank; methods in nominal order, nominal ranks framed."
-    )
-    if not len(ranks.taus):
-        return left
-    return (
-        f"{left} Right: draws by Kendall's tau-b of their ranking against the nominal one. Dot and bar: mean and "
-        "95 % interval; dashed: unrelated."
-    )
+        yield (
+            path,
+            f"Ranks of the methods over {len(ranks.used)} draws of {ranks.swept.before}. Left: share of draws [%] in "
+            "which a method has each rank; methods in nominal order, nominal ranks framed. Right: draws by Kendall's "
+            "tau-b of their ranking against the nominal one. Dot and bar: mean and 95 % interval; dashed: unrelated.",
+        )
 
 
 def _any(report: Report) -> bool:

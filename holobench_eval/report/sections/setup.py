@@ -9,7 +9,7 @@ from ...study.plan import is_reference
 from ..data.layout import FLOOR, TrainingSet
 from ..data.results import Results
 from ..data.text import FILES, plain
-from ..markdown import Markdown, blocks, bullets, code, code_block, heading, properties, table
+from ..markdown import Markdown, bullets, code, code_block, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
 from .alignment import agreement
 
@@ -35,13 +35,9 @@ def _described(report: Report, _: Figures) -> Blocks:
     yield _methods(report)
 
 
-def _details_of(report: Report) -> Markdown:
-    return blocks(
-        [
-            heading(Markdown("Details: {}").format(report.layout.title), 1),
-            Markdown("What [report.md](report.md) rests on, number by number."),
-        ]
-    )
+def _details(report: Report, _: Figures) -> Blocks:
+    yield heading(Markdown("Details: {}").format(report.layout.title), 1)
+    yield Markdown("What [report.md](report.md) rests on, number by number.")
 
 
 def _on_displays(report: Report) -> list[tuple[str, str]]:
@@ -152,7 +148,7 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 SECTIONS = (
-    Section("details", 1, lambda report, _: [_details_of(report)], details=True),
+    Section("details", 1, _details, details=True),
     Section("setup", 10, _setup, details=True),
     Section("displays and methods", 20, _described, lambda report: report.layout.measure != FILES, details=True),
     Section("environment", 220, _environment, details=True),

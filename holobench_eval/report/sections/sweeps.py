@@ -6,62 +6,52 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..charts.curves import draw_sweep
-from ..charts.tiles import Row, draw_rows, spread
+from ..charts.style import slugs
+from ..charts.tiles import draw_rows, spread
 from ..data.layout import OFFLINE, ONLINE
 from ..data.sweeps import Sweep
+from ..data.text import grouped
 from ..section import Report, Section
 
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
 MOST_ROWS = 4
 
 
-def _by_kind(report: Report) -> list[list[Sweep]]:
-    """The sweeps with rows of methods, those of a kind together."""
-    drawable = [sweep for sweep in report.sweeps if sweep.methods]
-    kinds = dict.fromkeys(sweep.swept.kind for sweep in drawable)
-    return [[sweep for sweep in drawable if sweep.swept.kind == kind] for kind in kinds]
+def _drawable(report: Report) -> list[Sweep]:
+    """The sweeps with rows of methods."""
+    return [sweep for sweep in report.sweeps if sweep.methods]
 
 
 def _curves(report: Report) -> Iterator[tuple[Path, str]]:
     """Curves of every kind of change."""
     results = report.results
-    for same in _by_kind(report):
-        change, kind = same[0].kind.words, same[0].swept.kind
+    for kind, same in grouped((sweep.swept.kind, sweep) for sweep in _drawable(report)).items():
         path = report.figures / f"quality-sweep-{kind}.png"
         draw_sweep(path, same, f"{results.headline.axis}{report.layout.text.axis}")
         yield (
             path,
-            f"{results.headline.axis} along a change: {change}. Mean over targets; bars, slightly offset: 95 % "
-            "interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
+            f"{results.headline.axis} along a change: {same[0].kind.words}. Mean over targets; bars, slightly offset: "
+            "95 % interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
         )
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
-    """Rows of pictures of the target in the middle of their ranking by quality."""
-    thumbnails = report.thumbnails
+    """Rows of pictures of the target in the middle of their ranking by quality, a row a chosen method."""
+    thumbnails, stems = report.thumbnails, slugs(report.results.conditions)
     first = report.results.conditions[0]
     if not thumbnails.targets(first):
         return
     target = thumbnails.middle(first)
-    for same in _by_kind(report):
-        change, kind = same[0].kind.words, same[0].swept.kind
-        for sweep in same:
-            stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in sweep.swept.before)
-            path = report.figures / f"sweep-{kind}-{stem}.jpg"
-            rows = _rows(report, sweep, target)
-            draw_rows(
-                path, f"{sweep.swept.before}: {change}", (target, thumbnails.targets(sweep.swept.before)[target]), rows
-            )
-            yield path, f"Captures of {target} on {sweep.swept.before} along a change: {change}."
-
-
-def _rows(report: Report, sweep: Sweep, target: str) -> list[Row]:
-    """A row of captures for each of the chosen methods."""
-    points, tile = spread(sweep.points, MOST_VALUES), report.thumbnails.tile
-    return [
-        Row(label, tuple((sweep.text(value), tile(label, name, target)) for value, name in points))
-        for label in _chosen(sweep)
-    ]
+    for sweep in _drawable(report):
+        before, change = sweep.swept.before, sweep.kind.words
+        points = spread(sweep.points, MOST_VALUES)
+        rows = [
+            (label, [(sweep.text(value), thumbnails.tile(label, name, target)) for value, name in points])
+            for label in _chosen(sweep)
+        ]
+        path = report.figures / f"sweep-{sweep.swept.kind}-{stems[before]}.jpg"
+        draw_rows(path, f"{before}: {change}", (target, thumbnails.targets(before)[target]), rows)
+        yield path, f"Captures of {target} on {before} along a change: {change}."
 
 
 def _chosen(sweep: Sweep) -> list[str]:
@@ -75,16 +65,12 @@ def _chosen(sweep: Sweep) -> list[str]:
     return list(dict.fromkeys([*first, *paper, *others]))[:MOST_ROWS]
 
 
-def _any(report: Report) -> bool:
-    return any(sweep.methods for sweep in report.sweeps)
-
-
 SECTIONS = (
-    Section("along the changes", 45, applies=_any, figures=_curves),
+    Section("along the changes", 45, applies=lambda report: bool(_drawable(report)), figures=_curves),
     Section(
         "pictures along the changes",
         46,
-        applies=_any,
+        applies=lambda report: bool(_drawable(report)),
         figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
     ),
 )

@@ -17,7 +17,6 @@ from ..page.html import asset
 from .html import page, slug
 from .intake import Source, folded, folders, read
 from .pages import about, cards, places, studies
-from .pictures import Picture
 
 MARK = "files-of-the-site.txt"
 
@@ -110,19 +109,19 @@ def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tu
     title = "Which phase-retrieval method, on which display?"
     yield "index.html", page("index", up="", title=title, about=about, **values)
     for name, own in displays.items():
-        headed = [(f"{each['of'].source.name}{each['of'].whose}", each) for each in own]
-        sheets: list[Picture] = next((each["sheets"] for each in own if each["sheets"]), [])
-        values = {"about": own[0]["about"], "boards": headed, "pictures": sheets, "notes": "", "facts": []}
+        headed = [(f"{each.of.source.name}{each.of.whose}", each) for each in own]
+        sheets = next((each.sheets for each in own if each.sheets), [])
+        values = {"about": own[0].about, "boards": headed, "pictures": sheets, "notes": "", "facts": []}
         yield f"displays/{slug(name)}.html", page("boards", title=f"Display {name}", **values)
     for name, rows in methods.items():
         pictures = [picture for study in found for picture in study.thumbnails if picture.of == name]
         text = page("method", title=name, about=about(name), places=rows, pictures=pictures)
         yield f"methods/{slug(name)}.html", text
     for study in found:
-        shown = [picture.path for each in study.boards for picture in each["pictures"]]
+        shown = [picture.path for each in study.boards for picture in each.pictures]
         values = {
             "about": study.question,
-            "boards": [(each["title"], each) for each in study.boards],
+            "boards": [(each.title, each) for each in study.boards],
             "pictures": [picture for picture in study.figures if picture.path not in shown],
             "notes": study.notes,
             "facts": study.facts,

@@ -6,6 +6,9 @@ import re
 from typing import Any
 
 from ...core.hashing import digest
+from ..data.board import GROUPS
+from ..data.phrases import verdict
+from ..data.text import number
 from ..page.html import templates
 
 # Nothing is loaded but the files of the site; no script, no form, no frame, no address of another place.
@@ -14,6 +17,7 @@ POLICY = "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri '
 _TAKEN = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])?|.*-[0-9a-f]{8}")
 
 _templates = templates("holobench_eval.report.site", "templates")
+_templates.globals |= {"GROUPS": GROUPS, "number": number, "verdict": verdict}
 
 
 def page(template: str, up: str = "../", **values: Any) -> bytes:

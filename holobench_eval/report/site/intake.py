@@ -8,15 +8,15 @@ provenance, and has to say the harness that its numbers come from.
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
@@ -37,6 +37,7 @@ STATES = (DONE, "failed", "skipped", "unavailable", "missing")
 MEASURES = ("picture", "focus", "views", "prediction", "error_budget", FILES)
 EXPOSURES = ("equal", "matched", "")
 LOUDEST = 200.0  # dB, of any score that makes sense
+FINITE = 1e300  # the same of other scores
 NAMES = ("display", "condition", "method", "label", "target", "cluster")
 CAPTURES = ("captures", "training_captures")
 COUNTS = (*CAPTURES, "solving_s", "training_s")
@@ -50,119 +51,100 @@ def folded(name: str) -> str:
     return " ".join(unicodedata.normalize("NFKC", name).casefold().split())
 
 
-def check_names(folder: Path, raw: pd.DataFrame) -> None:
-    """UserError: names that a reader cannot see or tell apart, or too many."""
-    if not folder.resolve().name.isprintable():
-        raise UserError(f"{str(folder)!r}: its name has characters that cannot be seen; rename it")
-    for column_name in (name for name in NAMES if name in raw):
-        seen: dict[str, str] = {}
-        for name in sorted(raw[column_name].unique()):
-            where = f"{folder / RECORDS}: {column_name}"
-            if len(name) > LONGEST:
-                raise UserError(f"{where}: a name of {len(name)} characters; expected at most {LONGEST}")
-            if not name.isprintable():
-                raise UserError(f"{where} {name!r}: characters that cannot be seen; take them out")
-            if (other := seen.setdefault(folded(name), name)) != name or name != name.strip():
-                raise UserError(f"{where} {name!r}: differs by case or space alone from {other.strip()!r}; use one")
-    count = raw["label"].nunique() if "label" in raw else 0
-    for number, most, what in ((len(raw), MOST_ROWS, "rows"), (count, MOST_LABELS, "labels")):
+def names_wrong(raw: pd.DataFrame) -> Iterator[str]:
+    """Names that a reader cannot see or tell apart, or too many. raw: every cell of records as text."""
+    for number, most, what in ((len(raw), MOST_ROWS, "rows"), (raw["label"].nunique(), MOST_LABELS, "labels")):
         if number > most:
-            raise UserError(f"{folder / RECORDS}: {number} {what}; expected at most {most} in a study")
+            yield f"{number} {what}; expected at most {most} in a study"
+    for name in NAMES:
+        seen: dict[str, str] = {}
+        for text in sorted(raw[name].unique()):
+            if len(text) > LONGEST:
+                yield f"{name}: a name of {len(text)} characters; expected at most {LONGEST}"
+            if not text.isprintable():
+                yield f"{name} {text!r}: characters that cannot be seen; take them out"
+            if (other := seen.setdefault(folded(text), text)) != text or text != text.strip():
+                yield f"{name} {text!r}: differs by case or space alone from {other.strip()!r}; use one"
 
 
-def check_provenance(folder: Path, known: Mapping[str, Any], strict: bool) -> None:
-    """UserError: facts are lacking. strict: of a folder of others."""
-    path, measured_files = folder / provenance.FILE, "files" in known
+def facts_wrong(known: Mapping[str, Any], frame: pd.DataFrame, strict: bool) -> Iterator[str]:
+    """Facts that a provenance lacks, each only where those before are there. strict: of a folder of others."""
+    measured_files, remedy = "files" in known, "copy the provenance.json that 'holoeval run' wrote"
     needed = ["package", *(["harness"] if strict and not measured_files else [])]
     lacking = [key for key in needed if not isinstance(known.get(key), str) or not known[key]]
     profiles = known.get("profiles", {})
     if not isinstance(profiles, dict) or not (profiles or measured_files):
         lacking.append("profiles")
     if lacking:
-        raise UserError(f"{path}: lacks {', '.join(lacking)}; copy the provenance.json that 'holoeval run' wrote")
+        yield f"lacks {', '.join(lacking)}; {remedy}"
     for name, profile in profiles.items():
         digest = profile.get("sha256") if isinstance(profile, dict) else None
         if not isinstance(digest, str) or not _SHA256.fullmatch(digest):
-            raise UserError(f"{path}: profile {name!r} has no digest; expected its version and 64 digits of sha256")
+            yield f"profile {name!r} has no digest; expected its version and 64 digits of sha256"
     kinds = known.get("displays", {})
     if not isinstance(kinds, dict) or not all(kind in KINDS for kind in kinds.values()):
-        raise UserError(f'{path}: "displays" says what each display is; expected one of {", ".join(KINDS)} for each')
+        yield f'"displays" says what each display is; expected one of {", ".join(KINDS)} for each'
+    unknown = sorted(set(frame["display"]) - {*profiles})
+    if unknown and not (frame["measure"] == FILES).all():
+        yield f"no digest of the display {unknown[0]!r} of {RECORDS}; {remedy} with it"
 
 
-def check_columns(folder: Path, frame: pd.DataFrame) -> None:
-    """UserError: a column is unknown, or there is none of a score."""
-    path = folder / RECORDS
-    unknown = [name for name in frame if column(RECORDS, str(name)) is None]
-    if unknown:
-        raise UserError(
-            f"{path}: unknown column {unknown[0]!r}; expected those of columns.md (docs/results/data.md); take it out"
-        )
+def columns_wrong(frame: pd.DataFrame) -> Iterator[str]:
+    """A column that is unknown, or none of a score."""
+    if unknown := [name for name in frame if column(RECORDS, str(name)) is None]:
+        yield f"unknown column {unknown[0]!r}; expected those of columns.md (docs/results/data.md); take it out"
     if not any(parse(name).metric in METRICS for name in score_columns(frame)):
-        raise UserError(f"{path}: no column of a score; expected one such as psnr_linear_db")
+        yield "no column of a score; expected one such as psnr_linear_db"
 
 
-def check_rows(folder: Path, raw: pd.DataFrame, frame: pd.DataFrame) -> None:
-    """UserError: a word that is not known, a number that cannot be, or two cells that contradict each other."""
-    path = folder / RECORDS
+def cells_wrong(raw: pd.DataFrame, frame: pd.DataFrame) -> Iterator[str]:
+    """A word that is not known, a number that cannot be, or two cells that contradict each other."""
     for name, allowed in (
         ("state", STATES),
         ("exposure", EXPOSURES),
         ("measure", MEASURES),
         ("category", (*CATEGORIES, FLOOR)),
     ):
-        wrong = sorted(set(frame[name]) - set(allowed))
-        if wrong:
-            named = ", ".join(word or "nothing" for word in allowed)
-            raise UserError(f"{path}: {name} {wrong[0]!r}; expected one of {named}")
+        if wrong := sorted(set(frame[name]) - set(allowed)):
+            yield f"{name} {wrong[0]!r}; expected one of {', '.join(word or 'nothing' for word in allowed)}"
     if len(measures := sorted(set(frame["measure"]))) > 1:
-        raise UserError(f"{path}: measures {' and '.join(measures)}; expected one study a folder")
-    for name in [*score_columns(frame), *(name for name in COUNTS if name in frame)]:
-        _check_numbers(path, raw, frame, name)
+        yield f"measures {' and '.join(measures)}; expected one study a folder"
+    scores = score_columns(frame)
+    for name in [*scores, *(name for name in COUNTS if name in frame)]:
+        low, high = _bounds(name)
+        rows = frame[~frame[name].between(low, high) & (raw[name] != "")]  # what is text and no number is wrong, too
+        if len(rows):
+            yield f"{_named(rows)} has {name} {rows[name].iloc[0]:g}; expected a number from {low:g} to {high:g}"
     for side in ("panel_height_px", "panel_width_px"):
-        wrong = sorted(text for text in set(raw[side]) if text and not _SIDE.fullmatch(text))
-        if wrong:
-            raise UserError(f"{path}: {side} {wrong[0]!r}; expected a number of pixels from 1 to 99999")
+        if wrong := sorted(text for text in set(raw[side]) if text and not _SIDE.fullmatch(text)):
+            yield f"{side} {wrong[0]!r}; expected a number of pixels from 1 to 99999"
     spent = frame[[name for name in CAPTURES if name in frame]].gt(0).any(axis=1)
-    done, scored = frame["state"] == DONE, frame[score_columns(frame)].notna().any(axis=1)
-    for rows, what in (
+    done, scored = frame["state"] == DONE, frame[scores].notna().any(axis=1)
+    for is_wrong, what in (
         (spent & (frame["category"] == OPEN_LOOP), f"{OPEN_LOOP} and has captures; expected none, or another category"),
         (done & ~scored, "done and has no score; expected a score of done cells alone"),
         (~done & scored, "not done and has a score; expected a score of done cells alone"),
     ):
-        if rows.any():
-            raise UserError(f"{path}: {_named(frame[rows])} is {what}")
+        if is_wrong.any():
+            yield f"{_named(frame[is_wrong])} is {what}"
 
 
-def _check_numbers(path: Path, raw: pd.DataFrame, frame: pd.DataFrame, name: str) -> None:
-    """UserError: a number that is not finite, or that no such score or count can be."""
-    values, metric = frame[name].to_numpy(dtype=np.float64), METRICS.get(parse(name).metric)
-    low, high = -np.inf, np.inf
+def _bounds(name: str) -> tuple[float, float]:
+    """Least and most that a score or a count can be."""
+    metric = METRICS.get(parse(name).metric)
     if name in COUNTS:
-        low, high = 0.0, MOST_COUNTED
-    elif metric is not None:
-        bound = LOUDEST if metric.unit == "dB" else 100.0
-        best = min(metric.best, bound) if metric.direction == "higher" else max(metric.best, -bound)
-        low, high = (-bound, best + 1e-5) if metric.direction == "higher" else (best - 1e-5, bound)
-    wrong = np.isinf(values) | (values < low) | (values > high) | (np.isnan(values) & (raw[name] != "").to_numpy())
-    if wrong.any():
-        row = frame[wrong]
-        limits = f"from {low:g} to {high:g}" if np.isfinite(high) else "finite"
-        raise UserError(f"{path}: {_named(row)} has {name} {row[name].iloc[0]:g}; expected a number {limits}")
+        return 0.0, MOST_COUNTED
+    if metric is None:
+        return -FINITE, FINITE
+    bound = LOUDEST if metric.unit == "dB" else 100.0
+    if metric.direction == "higher":
+        return -bound, min(metric.best, bound) + 1e-5
+    return max(metric.best, -bound) - 1e-5, bound
 
 
 def _named(rows: pd.DataFrame) -> str:
     """The first of some rows, as a message names it."""
     return ", ".join(str(rows.iloc[0][name])[:60] for name in ("label", "condition", "target"))
-
-
-def check_displays(folder: Path, known: Mapping[str, Any], frame: pd.DataFrame) -> None:
-    """UserError: a display of the records is not in the provenance."""
-    unknown = sorted(set(frame["display"]) - {*known.get("profiles", {})})
-    if unknown and not (frame["measure"] == FILES).all():
-        raise UserError(
-            f"{folder / provenance.FILE}: no digest of the display {unknown[0]!r} of {RECORDS}; copy the "
-            "provenance.json that 'holoeval run' wrote with it"
-        )
 
 
 TABLE: Final = "table.csv"
@@ -227,18 +209,19 @@ def read(folder: Path, own: Path) -> Source:
     _check_file(folder / provenance.FILE)
     known, raw = _known(folder), _texts(folder / RECORDS)
     by = _whose(folder, known, own)
-    check_names(folder, raw)
+    if not folder.resolve().name.isprintable():
+        raise UserError(f"{str(folder)!r}: its name has characters that cannot be seen; rename it")
     frame = records_of(folder, records_text(folder / RECORDS))
-    check_provenance(folder, known, strict=bool(by))
-    check_columns(folder, frame)
-    check_rows(folder, raw, frame)
+    of_records = itertools.chain(names_wrong(raw), columns_wrong(frame), cells_wrong(raw, frame))
+    for path, problems in ((RECORDS, of_records), (provenance.FILE, facts_wrong(known, frame, strict=bool(by)))):
+        for problem in problems:
+            raise UserError(f"{folder / path}: {problem}")
     displays = frame.loc[(frame["condition"] == frame["display"]) & (frame["category"] != FLOOR), "condition"]
     nominal = frame[(frame["category"] == FLOOR) | frame["condition"].isin(displays)].reset_index(drop=True)
     if displays.empty:
         raise UserError(
             f"{folder / RECORDS}: no row of an unchanged display; expected rows whose condition is a display"
         )
-    check_displays(folder, known, nominal)
     headline, baseline = _tested(folder, nominal)
     results = Results(nominal, _layout(folder, nominal, headline.key, baseline))
     if results.layout.measure != "error_budget":  # which is made of further scores than those that a site shows

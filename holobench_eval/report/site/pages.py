@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from inspect import getdoc
-from typing import Any
 
 from ...core import plugins
 from ...core.errors import UserError
 from ...display.simulated.profile import load_profile, names
 from ...display.simulated.shelf import installed
 from ..answers.comparison import of_display
-from ..data import board as boards
-from ..data.phrases import verdict
-from ..data.statistics import Estimate
-from ..data.text import grouped, number
+from ..data.board import Board, Display, Row, board
+from ..data.text import grouped
 from .html import slug
 from .intake import Source, text_of
 from .pictures import STAGES, Picture, figures, thumbnails
@@ -27,8 +23,6 @@ from .pictures import STAGES, Picture, figures, thumbnails
 BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays
 FACTS = ("by", "package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu",
          "gpu", "device", "threads", "workers", "started", "ended")  # fmt: skip
-
-Shown = dict[str, Any]  # the board of a display in a study
 
 
 @dataclass(frozen=True)
@@ -74,10 +68,54 @@ class Study:
         return " ".join([*notes, *([f"{changed} conditions are changes of a display, and not shown."] * bool(changed))])
 
     @cached_property
-    def boards(self) -> list[Shown]:
+    def board(self) -> Board:
         """Of its displays."""
-        whole = boards.board(self.source.results)
-        return [_shown(self, whole, display) for display in whole.displays]
+        return board(self.source.results)
+
+    @cached_property
+    def boards(self) -> list[Shown]:
+        """A display each."""
+        return [Shown(self, display, *_identity(self.source, display.name)) for display in self.board.displays]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A display in a study, as templates take it; title, about: see ``_identity``."""
+
+    of: Study
+    display: Display
+    title: str
+    about: str
+
+    @property
+    def panel(self) -> str:
+        """Its size, where that is known."""
+        frame = self.of.source.results.frame
+        sides = frame.loc[frame["display"] == self.display.name, ["panel_height_px", "panel_width_px"]].dropna()
+        return "".join(f", panel of {height:.0f} x {width:.0f} pixels" for height, width in sides.head(1).to_numpy())
+
+    @property
+    def ends(self) -> list[float]:
+        """Of the drawings of differences, zero among them."""
+        drawn = [row.test.estimate for row in self.display.rows if row.test and row.test.estimate.has_interval]
+        return [0.0, *(end for estimate in drawn for end in (estimate.low, estimate.high))]
+
+    @property
+    def verdict(self) -> str:
+        """Of a comparison of pictures."""
+        results = self.of.source.results
+        return of_display(results, self.display) if results.layout.measure == "picture" else ""
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """Those that answer, beside the first display."""
+        is_first = self.display is self.of.board.displays[0]
+        return [picture for picture in self.of.figures if is_first and picture.of == "answer-pictures"]
+
+    @property
+    def sheets(self) -> list[Picture]:
+        """Of the stages of the display."""
+        return [picture for picture in self.of.sheets if picture.of == f"{STAGES}{self.display.name}"]
 
 
 def studies(sources: Sequence[Source]) -> list[Study]:
@@ -90,37 +128,6 @@ def studies(sources: Sequence[Source]) -> list[Study]:
             name = f"{slug(source.name)}-{count}"
         found[name] = Study(source, name, thumbnails(source, name), *figures(source, name))
     return list(found.values())
-
-
-def _shown(study: Study, whole: boards.Board, display: boards.Display) -> Shown:
-    """The board of a display in a study, as templates take it."""
-    source, results, score = study.source, study.source.results, study.source.results.headline
-    count, clusters = len(results.targets), len(set(results.clusters))
-    panels = results.frame.loc[results.frame["display"] == display.name, ["panel_height_px", "panel_width_px"]].dropna()
-    sides = [f", panel of {height:.0f} x {width:.0f} pixels" for height, width in panels.head(1).to_numpy()]
-    title, about = _identity(source, display.name)
-    drawn = [estimate for row in display.rows if (estimate := _drawn(row))]
-    ends = [0.0, *(end for estimate in drawn for end in (estimate.low, estimate.high))]
-    answers = [picture for picture in study.figures if picture.of == "answer-pictures"]
-    return {
-        "title": title,
-        "about": about,
-        "heading": "".join([score.heading, *sides]),
-        "score": score,
-        "baseline": results.layout.baseline,
-        "beside": whole.beside,
-        "floor": "" if display.floor is None else f" A gray picture scores {score.with_unit(display.floor)}.",
-        "counted": f"{count} targets{f' in {clusters} clusters' if clusters < count else ''}.",
-        "verdict": of_display(results, display) if results.layout.measure == "picture" else "",
-        "left": min(ends),  # of the drawings
-        "width": max(ends) - min(ends) or 1.0,
-        "groups": [
-            {"name": boards.GROUPS[group], "rows": [_row(whole, row) for row in rows]} for group, rows in display.groups
-        ],
-        "pictures": answers if display.name == results.conditions[0] else [],
-        "sheets": [picture for picture in study.sheets if picture.of == f"{STAGES}{display.name}"],
-        "of": study,
-    }
 
 
 def _identity(source: Source, name: str) -> tuple[str, str]:
@@ -142,37 +149,14 @@ def _identity(source: Source, name: str) -> tuple[str, str]:
     return f"{name} ({other})", "Another display, or another version of one, than is installed here."
 
 
-def _drawn(row: boards.Row) -> Estimate | None:
-    """The difference of a row that is drawn."""
-    return row.test.estimate if row.test and math.isfinite(row.test.estimate.low) else None
-
-
-def _row(whole: boards.Board, row: boards.Row) -> dict[str, Any]:
-    results, score, test = whole.results, whole.results.headline, row.test
-    found = verdict(score, test) if test else ""
-    return {
-        "tier": row.tier,
-        "method": results.names[row.label],
-        "name": ", ".join([row.label, *whole.marks(row)]),
-        "score": score.number(row.score.mean),
-        "difference": score.estimate(test.estimate, signed=True) if test else "",
-        "verdict": found if found in ("better", "worse") else "same",
-        "drawn": _drawn(row),
-        "beside": [each.number(value) for each, value in zip(whole.beside, row.beside, strict=True)],
-        "photographs": number(row.photographs),
-        "seconds": number(row.seconds),
-    }
-
-
-def places(found: Sequence[Study], method: str) -> list[dict[str, Any]]:
+def places(found: Sequence[Study], method: str) -> list[tuple[Shown, Row]]:
     """The rows of a method on every display of every study."""
     return [
-        {**row, "display": shown["title"], "baseline": shown["baseline"], "of": study, "unit": shown["score"].unit}
+        (shown, row)
         for study in found
         for shown in study.boards
-        for group in shown["groups"]
-        for row in group["rows"]
-        if row["method"] == method
+        for row in shown.display.rows
+        if study.source.results.names[row.label] == method
     ]
 
 
@@ -187,4 +171,4 @@ def about(method: str) -> str:
 def cards(found: Sequence[Study]) -> dict[str, list[Shown]]:
     """The boards that enter, by the title of their display, own ones first."""
     entering = sorted((study for study in found if study.enters), key=lambda study: bool(study.source.by))
-    return grouped((str(each["title"]), each) for study in entering for each in study.boards)
+    return grouped((each.title, each) for study in entering for each in study.boards)

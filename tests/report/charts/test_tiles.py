@@ -8,7 +8,6 @@ from holobench_eval.report.charts.style import LARGEST, save_picture, slugs
 from holobench_eval.report.charts.tiles import (
     HEADER,
     SIDE,
-    Row,
     Tile,
     draw_comparison,
     draw_rows,
@@ -27,12 +26,12 @@ def noise(size, seed=0):
 def test_the_enlarged_window_is_the_most_detailed_one():
     target = np.full((64, 64, 3), 0.5)
     target[40:45, 8:13] = noise(5)
-    crop = most_detailed(target)
-    assert (crop.height, crop.width) == (7, 7)
-    assert 38 <= crop.top <= 40
-    assert 6 <= crop.left <= 8
+    rows, columns = most_detailed(target)
+    assert (rows.stop - rows.start, columns.stop - columns.start) == (7, 7)
+    assert 38 <= rows.start <= 40
+    assert 6 <= columns.start <= 8
     even = most_detailed(np.full((32, 48, 3), 0.2))
-    assert (even.top, even.left) == (0, 0)  # of equally detailed windows, the first
+    assert [side.start for side in even] == [0, 0]  # of equally detailed windows, the first
 
 
 def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_path):
@@ -50,7 +49,7 @@ def test_targets_of_a_large_study_are_spread_from_first_to_last():
 def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(tmp_path):
     target, capture = noise(200), noise(200, seed=1)
     tiles = (("method", Tile(capture, "PSNR 7.00 dB")), ("lost", Tile(None, "failed: the residual is too large $x$")))
-    draw_rows(tmp_path / "page.png", "bench", ("noise", target), [Row("", tiles)])
+    draw_rows(tmp_path / "page.png", "bench", ("noise", target), [("", tiles)])
     page = load_picture(tmp_path / "page.png")
     first, second = (page[HEADER : HEADER + 200, SIDE + place * 208 :][:, :200] for place in (1, 2))
     assert np.abs(first - capture).max() < 1 / 255
@@ -81,13 +80,14 @@ def test_displays_keep_figures_of_their_own_whatever_they_are_called():
 
 def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(tmp_path):
     target, capture = noise(207), noise(207, seed=1)
-    draw_comparison(tmp_path / "page.png", "bench", target, [("method", Tile(capture, "x"))], 0.5)
-    page, crop = load_picture(tmp_path / "page.png"), most_detailed(target)
+    draw_comparison(tmp_path / "page.png", "bench", target, [("method", "x", capture)])
+    page, window = load_picture(tmp_path / "page.png"), most_detailed(target)
+    scale = error_limit([tiles.error_map(capture, target)])
     left, top, side = SIDE + 207 + 8, HEADER + 207 + 20, 4 * 23
-    enlarged = crop.of(capture).repeat(4, axis=0).repeat(4, axis=1)
+    enlarged = capture[window].repeat(4, axis=0).repeat(4, axis=1)
     assert np.abs(page[top : top + side, left : left + side] - enlarged).max() < 1 / 255
     drawn = page[top : top + side, left + 207 - side : left + 207]
-    colours = colormaps["magma"](np.minimum(tiles.error_map(crop.of(capture), crop.of(target)) / 0.5, 1))[..., :3]
+    colours = colormaps["magma"](np.minimum(tiles.error_map(capture[window], target[window]) / scale, 1))[..., :3]
     assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
 
 

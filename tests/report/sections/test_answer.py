@@ -18,8 +18,7 @@ DESCRIPTION = Description(
             "Version 1.",
             (),
             basis="simulated; x was fitted to published PSNR",
-            modelled={"HIL": ("crosstalk", "zero_order"), "GS": ()},
-            effects=9,
+            modelled={"HIL": (2, 9), "GS": (0, 9)},
         ),
     )
 )
