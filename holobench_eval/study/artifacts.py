@@ -140,14 +140,6 @@ class Artifacts:
         write_atomically(self.folder_of(preparation) / FAILURE, text.encode("utf-8", "backslashreplace"))
         return line
 
-    def has_failed(self, preparation: Preparation) -> bool:
-        """Whether the last attempt to make the artifact failed."""
-        return (self.folder_of(preparation) / FAILURE).is_file()
-
-    def forget_failure(self, preparation: Preparation) -> None:
-        """Remove the note of a failure: the training goes on."""
-        (self.folder_of(preparation) / FAILURE).unlink(missing_ok=True)
-
     def failure(self, preparation: Preparation) -> str:
         """The reason why an artifact is missing, in one line."""
         try:
@@ -168,10 +160,6 @@ class Artifacts:
     def memory(self, preparation: Preparation) -> FolderMemory:
         """Where an unfinished training is kept."""
         return FolderMemory(self.folder_of(preparation))
-
-    def journal(self, preparation: Preparation) -> Journal:
-        """The captures of an unfinished training, those of attempts that failed included."""
-        return self.memory(preparation).journal
 
 
 @dataclass(frozen=True)
@@ -210,7 +198,7 @@ class FolderMemory:
 
     @property
     def journal(self) -> Journal:
-        """The captures that the training took."""
+        """The captures that the training took, those of attempts that failed included."""
         return Journal(self.folder / UNFINISHED / "captures")
 
     def _path(self, name: str) -> Path:

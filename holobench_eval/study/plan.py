@@ -16,7 +16,6 @@ from ..display.traits import traits_of
 from . import identity, isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
-from .isolation import read_files
 from .stacks import Showing, Target, at_once, given_views, offset, showings, stacks_of, targets_a_scene
 from .versions import HARNESS, dataset_version, method_version
 
@@ -248,7 +247,7 @@ class _Ground:
         """A task for every solution of a method: target by target, repeat by repeat."""
         study, cls = self.study, isolation.find(entry.name, self.study.folder)
         solved = {target: self._solved(target) for target in targets}
-        read = read_files.of(entry, study.folder, cls, dict.fromkeys(name for name, _ in solved.values()))
+        read = isolation.files_read(entry, study.folder, dict.fromkeys(name for name, _ in solved.values()))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
             first = conditions[0].nominal if self.stacks else conditions[0]
@@ -324,7 +323,7 @@ class _Ground:
         probe = self.study.holograms
         if not self.study.predicts:
             return {}
-        cls, files = type(self.probe), read_files.digests(self.probe, target[0])
+        cls, files = type(self.probe), isolation.digests(self.probe, target[0])
         phase = self._phase(cls, probe.params, target, display, repeat, files=files)
         return {"name": probe.name, "params": probe.params, "code": method_version(cls), "files": files, "phase": phase}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -126,8 +126,8 @@ def run(
             refuse_untrained(plan, left.missing, learned)
         store.remove(left.outdated)  # at once, so that a run that is killed does not take them for new
         watch.planned(len(plan.cells), len(left.wanted), plan.floors)
-        setting = _setting(study, output, artifacts, metrics, threads, executor.workers, device)
-        described = _begun(study, plan, left, setting, executor)
+        setting = Setting(replace(study), output, artifacts, metrics, threads, executor.workers, device)
+        described = _begun(setting, plan, left, executor)
         # With nothing to do no worker need be started.
         solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
@@ -137,28 +137,9 @@ def run(
         return Outcome(store.load(plan), described, len(left.missing), solved, rescored, len(states) - rescored)
 
 
-def _setting(
-    study: Study, output: Path, artifacts: Path, metrics: Mapping[str, str], threads: int, workers: int, device: str
-) -> Setting:
-    """What every worker is told of the run."""
-    return Setting(
-        output=output,
-        folder=study.folder,
-        artifacts=artifacts,
-        save=study.save,
-        metrics=metrics,
-        lpips_weights=study.protocol.lpips_weights,
-        threads=threads,
-        workers=workers,
-        device=device,
-        isolation=study.isolation,
-        limits=study.limits,
-    )
-
-
-def _begun(study: Study, plan: Plan, left: _Left, setting: Setting, executor: Executor) -> dict[str, Any]:
+def _begun(setting: Setting, plan: Plan, left: _Left, executor: Executor) -> dict[str, Any]:
     """The provenance, written as a run begins that computes something or has another config; else that from before."""
-    output, described = setting.output, provenance.read(setting.output)
+    study, output, described = setting.study, setting.output, provenance.read(setting.output)
     if left.missing or described.get("config_sha256") != provenance.text_digest(study.text):
         is_here = isinstance(executor, Serial | Local)  # else the GPU is another machine's
         gpu = gpu_name(find(setting.device)) if is_here else ""

@@ -19,7 +19,6 @@ from .. import cost, isolation, opening
 from ..artifacts import Artifact
 from ..displays import Condition
 from ..isolation import Reads
-from ..isolation.read_files import digests
 from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
@@ -67,7 +66,7 @@ def _foresee(job: Job) -> Foreseen:
     hologram, capture = shown(job, cell, display)
     others = {variant: shown(job, cell, display, variant) for variant in further(job)}
     method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
-    gate(method, cell.method, cell.code, digests(method, cell.target), cell.files)
+    gate(method, cell.method, cell.code, isolation.digests(method, cell.target), cell.files)
     for photograph in (capture, *(other for _, other in others.values())):
         refuse_saturated(photograph)
     handle = opening.open_display(display, cell.seed, job.device).for_method(
@@ -163,7 +162,7 @@ def shown(job: Job, cell: Cell, display: Condition, variant: str = "") -> tuple[
     is exposed as that of the unchanged one, or ``AGAIN``; each has noise of its own."""
     photograph = (digest(cell.holograms["phase"]), display, cell.seed, cell.repeat, cell.exposure, variant)
     known = _photographs.get(photograph)
-    if known is None or isolation.changed(known[0].covered, job.setting.folder):
+    if known is None or isolation.changed(known[0].covered, job.setting.study.folder):
         hologram = _changed(job, cell, display, variant) if variant in control.CHANGES else _solved(job, cell, display)
         bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
         item = f"{cell.target}, {variant}" if variant else cell.target  # it names the noise
@@ -196,7 +195,7 @@ def _solved(job: Job, cell: Cell, display: Condition, change: str = "") -> Solut
         return known
     bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
     method = job.method(name, cell.holograms["params"])
-    gate(method, name, cell.holograms["code"], digests(method, cell.target), cell.holograms["files"])
+    gate(method, name, cell.holograms["code"], isolation.digests(method, cell.target), cell.holograms["files"])
     handle = bench.for_method(method, name, target.to(job.device), item=cell.target, repeat=cell.repeat)
     wanted = changed_target(target, change, cell.seed, cell.target) if change else target
     own = wanted[None].to(job.device, copy=True)

@@ -16,7 +16,6 @@ from ...display.api import from_numpy, is_plain, type_name
 from ...display.phases import single
 from .. import cost, identity, isolation
 from ..displays import Condition
-from ..isolation.read_files import digests
 from ..phases import Solution, Starts
 from ..versions import gate
 from . import starts
@@ -32,7 +31,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     the score. Its inputs are on the job's device; its phase returns to the CPU.
     """
     first = job.task.cells[0]
-    takes_captures = isolation.traits(first.method, job.setting.folder).camera
+    takes_captures = isolation.traits(first.method, job.setting.study.folder).camera
     with job.phases.locked(first.phase_id) if takes_captures else nullcontext():
         return _solution(job, display, target, solve)
 
@@ -49,7 +48,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
     basis = {name: first.phase[name] for name in identity.BASIS}
     shared = Starts(job.phases, basis, job.device, job.target_reads())
     method = job.method(first.method, first.params)
-    gate(method, first.method, first.code, digests(method, first.target), first.files)
+    gate(method, first.method, first.code, isolation.digests(method, first.target), first.files)
     journal = job.phases.journal(first.phase_id)
     if display.in_session:  # its photographs are found again by each import, and so are no new captures
         journal.close()
