@@ -24,7 +24,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 import torch
@@ -218,12 +217,6 @@ def cpu_model() -> str:
     return named[0] if named else platform.processor() or platform.machine()
 
 
-@cache
-def _torch() -> str:
-    """The version of torch, cached: reading its metadata takes longer than the rest of ``key``."""
-    return version("torch")
-
-
 def timed(study: Study, plan: Plan) -> frozenset[str]:
     """Cells of the solutions that a study with ``timing: alone`` times without concurrent workers; else none.
 
@@ -246,7 +239,7 @@ def key(task: Task, threads: int, workers: int, gpu: str = "", apart: bool = Fal
     phase = task.cells[0].phase
     kind = {name: phase.get(name) for name in KIND} | {"planes": len(phase.get("planes", ()))}
     machine = [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))]
-    return digest([kind, task.cells[0].measure, machine, _torch(), __version__])
+    return digest([kind, task.cells[0].measure, machine, torch.__version__, __version__])
 
 
 def recorded(name: str) -> float | None:

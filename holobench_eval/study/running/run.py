@@ -13,7 +13,7 @@ from ...core.errors import reason as one_line
 from ...core.hashing import canonical, digest
 from ...display.traits import traits_of
 from ...metrics import catalogue
-from .. import cost, isolation
+from .. import cost, identity, isolation
 from ..artifacts import Artifacts
 from ..definition import Study
 from ..displays import Preparation
@@ -114,16 +114,10 @@ def run(
     store, learned = Store(output), Artifacts(artifacts)
     with store.locked():
         if retrain:
-            refuse_unscored(study)
-            refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
-            forget(plan, store, phases_of(output, study.folder), learned)
+            forget(study, plan, store, learned)
         metrics = {name: plan.metrics[name] for name in rescore or plan.metrics}
         left = _left(study, plan, store, learned, metrics, retry_failed, solves=not rescore)
-        if left.wanted:
-            refuse_unscored(study)
-        refuse_unavailable(plan, left.missing, study.folder)
-        if not trains:
-            refuse_untrained(plan, left.missing, learned)
+        _refuse(study, plan, left, learned, trains)
         store.remove(left.outdated)  # at once, so that a run that is killed does not take them for new
         watch.planned(len(plan.cells), len(left.wanted), plan.floors)
         setting = Setting(replace(study), output, artifacts, metrics, threads, executor.workers, device)
@@ -132,9 +126,10 @@ def run(
         solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
             described = provenance.end(output, described)
-        states = store.states(tuple(left.unscored.values()), metrics=metrics, folder=study.folder)
-        rescored = sum(state != "unscored" for state in states.values())
-        return Outcome(store.load(plan), described, len(left.missing), solved, rescored, len(states) - rescored)
+        again = filter(None, map(store.read, left.unscored))
+        unscored = sum(bool(identity.lacking(record.scores, metrics)) for record in again)
+        rescored = len(left.unscored) - unscored
+        return Outcome(store.load(plan), described, len(left.missing), solved, rescored, unscored)
 
 
 def _begun(setting: Setting, plan: Plan, left: _Left, executor: Executor) -> dict[str, Any]:
@@ -252,18 +247,24 @@ def _announced(plan: Plan, left: _Left, artifacts: Artifacts, watch: Lines) -> l
     return untrained
 
 
-def forget(plan: Plan, store: Store, phases: Phases, artifacts: Artifacts) -> None:
-    """Remove what was learned for a plan, and the phases and records that depend on it."""
+def forget(study: Study, plan: Plan, store: Store, artifacts: Artifacts) -> None:
+    """Remove what was learned for a plan, and the phases and records that depend on it; not where all of it could not
+    be computed again."""
+    refuse_unscored(study)
+    refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
     for preparation in plan.preparations().values():
         artifacts.remove(preparation)
     learned = [cell for cell in plan.cells if cell.prepared]
-    phases.remove(cell.phase_id for cell in learned)
+    phases_of(store.output, study.folder).remove(cell.phase_id for cell in learned)
     store.remove(cell.id for cell in learned)
 
 
-def refuse_untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> None:
-    """UserError, in one line, if a missing cell needs something that is not trained."""
-    for preparation in _untrained(plan, missing, artifacts):
+def _refuse(study: Study, plan: Plan, left: _Left, artifacts: Artifacts, trains: bool) -> None:
+    """UserError, in one line, where what is left cannot be computed here, or would be trained and may not be."""
+    if left.wanted:
+        refuse_unscored(study)
+    refuse_unavailable(plan, left.missing, study.folder)
+    for preparation in [] if trains else _untrained(plan, left.missing, artifacts):
         reason = artifacts.outdated(preparation) or f"{artifacts.folder} has nothing that it has learned"
         raise UserError(f"--no-train: {preparation.method} on {preparation.display.name} would be trained: {reason}")
 
