@@ -98,14 +98,15 @@ class Artifacts:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
         folder = self.folder_of(preparation)
         states = file_state(folder / STATE), file_state(folder / LOG)
-        try:
-            described = (folder / PROVENANCE).read_bytes() if states[0] else None
-        except OSError:
-            described = None
-        if described is None:
+        if states[0] is None or not (folder / PROVENANCE).is_file():
             raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; {AGAIN}")
-        artifact = _loaded(folder, states, described)
-        check_matches(folder, artifact.provenance, preparation)
+        artifact = _loaded(folder, states, (folder / PROVENANCE).read_bytes())
+        trained, wanted = artifact.provenance["description"], preparation.description()
+        for key in wanted:
+            if trained.get(key) != wanted[key]:
+                own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
+                found = f"trained for {key.replace('_', ' ')} {other}, this study needs {own}"
+                raise UserError(f"{folder}: {found}; delete it, or give --retrain")
         return artifact
 
     def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
@@ -193,7 +194,7 @@ class FolderMemory:
         text = io.StringIO()
         writer = csv.DictWriter(text, list(dict.fromkeys(key for entry in rows for key in entry)), lineterminator="\n")
         writer.writeheader()
-        writer.writerows([{key: value or "" for key, value in entry.items()} for entry in rows])
+        writer.writerows(rows)
         write_atomically(self.folder / LOG, text.getvalue().encode())
 
     @property
@@ -270,16 +271,6 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
         if not isinstance(content.get(key), kind):
             raise UserError(f"{path}: has no valid '{key}'; {AGAIN}")
     return content
-
-
-def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Preparation) -> None:
-    """UserError for a state trained for another description; it names the first entry that differs."""
-    trained, wanted = provenance["description"], preparation.description()
-    for key in wanted:
-        if trained.get(key) != wanted[key]:
-            own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
-            found = f"trained for {key.replace('_', ' ')} {other}, this study needs {own}"
-            raise UserError(f"{folder}: {found}; delete it, or give --retrain")
 
 
 @dataclass(frozen=True)

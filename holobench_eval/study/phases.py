@@ -26,8 +26,6 @@ from .cost import Cost
 from .versions import method_version
 
 RESULTS = "holoeval-results"  # the folder of all studies that are given no other
-# Of a solution, beside its cost.
-KEPT = ("phase", "captures", "stopped", "learned", "alone", "covered", "uncovered", "shown")
 LEVELS = 2**16  # of a start, to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
 
 
@@ -95,9 +93,9 @@ class Phases:
 
     def keep(self, identity: str, solution: Solution) -> None:
         """Keep a solution, in the place of an earlier one, and close its account."""
-        content = {**{name: getattr(solution, name) for name in KEPT}, "cost": asdict(solution.cost)}
+        content = {name: value for name, value in vars(solution).items() if name != "reused"}
         buffer = io.BytesIO()
-        torch.save(content, buffer)
+        torch.save({**content, "cost": asdict(solution.cost)}, buffer)
         write_atomically(self.path(identity), sealed(buffer.getvalue(), identity), lasting=solution.captures > 0)
         self.journal(identity).close()
 
