@@ -150,7 +150,9 @@ def _packages() -> Iterator[Finding]:
     complete = len(modules) - len(seen["errors"])
     yield Finding("packages", "ok", f"{complete} of {len(modules)} that the core needs can be imported")
     yield _versions(names)
-    yield _kernel(seen.get("kernel"))
+    fault = seen.get("kernel")
+    why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
+    yield _either("propagation", None if fault else "compiled for this processor", why, installing("numba"))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     yield Finding("CPU", "ok", f"{cores} cores for this process, {seen.get('threads', 'no')} torch threads")
     gpus = seen.get("gpus") or ["none that torch can use; nothing here needs one"]
@@ -166,14 +168,6 @@ def _versions(names: list[str]) -> Finding:
     other = {name: found for name, found in there.items() if found != wanted.get(name, found)}
     told = ", ".join(f"{name} {found} (not {wanted[name]})" for name, found in other.items())
     return _either("versions", None if other else "those of the committed results", told, installing(), "warning")
-
-
-def _kernel(fault: str | None) -> Finding:
-    """Whether propagation is compiled for this processor."""
-    if fault is None:
-        return Finding("propagation", "ok", "compiled for this processor")
-    why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
-    return Finding("propagation", "missing", why, installing("numba"))
 
 
 def _required() -> list[str]:

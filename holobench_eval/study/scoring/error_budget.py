@@ -8,7 +8,7 @@ from ...display.api import ideal_image
 from ...metrics import error_budget as budget
 from .job import Job, Measured
 from .picture import refuse_saturated
-from .prediction import AGAIN, ask, compared, further, shown
+from .prediction import AGAIN, ask, further, prediction, shown
 
 
 def error_budget(job: Job) -> Measured:
@@ -17,16 +17,16 @@ def error_budget(job: Job) -> Measured:
     cell, display = job.task.cells[0], job.task.conditions[0]
     ask(job, cell, display, dict.fromkeys(("", AGAIN, *further(job))))
 
-    def scores(phase: Tensor, target: Tensor, capture: Tensor, prediction: Tensor) -> dict[str, float]:
+    def scores(phase: Tensor, target: Tensor, capture: Tensor, predicted: Tensor) -> dict[str, float]:
         _, again = shown(job, cell, display, AGAIN)
         refuse_saturated(again)
         ideal = ideal_image(phase, display.spec)
         return {
             budget.TARGET: budget.unexplained(capture, target, target),
             budget.IDEAL: budget.unexplained(capture, ideal, target),
-            budget.PREDICTION: budget.unexplained(capture, prediction, target),
+            budget.PREDICTION: budget.unexplained(capture, predicted, target),
             budget.NOISE: budget.temporal(capture, again.image, target),
             budget.ALGORITHM: budget.unexplained(ideal, target, target),
         }
 
-    return compared(job, scores)
+    return prediction(job, scores)

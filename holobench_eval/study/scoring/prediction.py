@@ -30,24 +30,19 @@ from .scores import keep_capture, scores_of
 from .solution import solved_by, wrong_output
 
 PHOTOGRAPHS_KEPT = 64  # in a process: all methods predict the same ones
+More = Callable[[Tensor, Tensor, Tensor, Tensor], dict[str, float]]
+"""Scores of a hologram, its target ``(C, h, w)``, its capture, and the prediction of that, in the same unit."""
 AGAIN = "again"  # beside the changes of ``metrics.control``, another capture of the unchanged hologram
 
 
-def prediction(job: Job) -> Measured:
-    """Predict the capture of the hologram that the study shows for the task's target.
+def prediction(job: Job, more: More = lambda *_: {}) -> Measured:
+    """Predict the captures of the hologram that the study shows for the task's target, and of its changes where the
+    study asks for control.
 
     Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
     [0, 1]; the protocol's own match of the prediction follows.
-    """
-    return compared(job, lambda *_: {})
 
-
-def compared(job: Job, more: Callable[[Tensor, Tensor, Tensor, Tensor], dict[str, float]]) -> Measured:
-    """Predict the captures of the hologram of the task's target, and of its changes where the study asks for control,
-    and score the prediction by the protocol.
-
-    more: gives further scores of a hologram, its target ``(C, h, w)``, its capture and the prediction of that
-    ``(C, h, w)``, in the same unit.
+    more: gives further scores.
     """
     own, shown_on = job.task.cells[0], job.task.conditions[0]
     target = job.target(own, shown_on)
