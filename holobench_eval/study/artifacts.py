@@ -111,9 +111,7 @@ class Artifacts:
 
     def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
         """Keep a learned state; facts: further entries of its provenance. The unfinished training is removed."""
-        folder, buffer = self.folder_of(preparation), io.BytesIO()
-        torch.save({"format": FORMAT, "state": dict(state)}, buffer)
-        content = buffer.getvalue()
+        folder, content = self.folder_of(preparation), packed({"format": FORMAT, "state": dict(state)})
         write_atomically(folder / STATE, content)
         sha256 = hashlib.sha256(content).hexdigest()
         described = {
@@ -176,9 +174,7 @@ class FolderMemory:
 
     def save(self, name: str, value: dict[str, Any]) -> None:
         """Write a value; an interrupted write leaves the earlier file."""
-        buffer = io.BytesIO()
-        torch.save(value, buffer)
-        write_atomically(self._path(name), buffer.getvalue())
+        write_atomically(self._path(name), packed(value))
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
         """Add a row to ``training.csv``, ordered by round and step; rows of the same round and step are merged."""
@@ -218,6 +214,13 @@ def read_log(folder: Path) -> list[dict[str, str]]:
             return list(csv.DictReader(file))
     except FileNotFoundError:
         return []
+
+
+def packed(value: dict[str, Any]) -> bytes:
+    """Tensors and plain values as what a file holds, for ``read_tensors``."""
+    buffer = io.BytesIO()
+    torch.save(value, buffer)
+    return buffer.getvalue()
 
 
 def read_tensors(path: Path, file: IO[bytes] | None = None) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from ..display.account import Journal
 from ..display.metered import Solver
 from ..display.traits import traits_of
 from . import isolation
-from .artifacts import read_tensors
+from .artifacts import packed, read_tensors
 from .cost import Cost
 from .versions import method_version
 
@@ -94,9 +94,8 @@ class Phases:
     def keep(self, identity: str, solution: Solution) -> None:
         """Keep a solution, in the place of an earlier one, and close its account."""
         content = {name: value for name, value in vars(solution).items() if name != "reused"}
-        buffer = io.BytesIO()
-        torch.save({**content, "cost": asdict(solution.cost)}, buffer)
-        write_atomically(self.path(identity), sealed(buffer.getvalue(), identity), lasting=solution.captures > 0)
+        file = sealed(packed(content | {"cost": asdict(solution.cost)}), identity)
+        write_atomically(self.path(identity), file, lasting=solution.captures > 0)
         self.journal(identity).close()
 
     def remove(self, identities: Iterable[str]) -> None:

@@ -30,6 +30,7 @@ from ...core.seeds import generator, seed
 from ...core.yaml_source import load
 from ...display import Profile, load_profile
 from ...metrics import score
+from ..artifacts import packed
 from ..definition import Targets
 from ..executors import Executor
 from ..opening import open_bench
@@ -248,8 +249,7 @@ def _solve(family: Family, number: int, folder: Path) -> None:
     kept = {TARGETS: targets}
     for name in family.figures:
         kept[name] = {item: hologram(name, bench, target, item) for item, target in targets.items()}
-    torch.save(kept, path.with_suffix(".part"))
-    path.with_suffix(".part").replace(path)
+    write_atomically(path, packed(kept))
 
 
 @cache
