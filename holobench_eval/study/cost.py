@@ -203,12 +203,10 @@ def folder() -> Path:
 @cache
 def cpu_model() -> str:
     """The processor's name, or its architecture where the system gives no name."""
-    try:
+    with suppress(OSError, StopIteration):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or platform.machine()
+        return next(line for line in lines if line.startswith("model name")).partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def timed(study: Study, plan: Plan) -> frozenset[str]:
