@@ -185,11 +185,10 @@ def plan(study: Study) -> Plan:
     targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)
     ground = _Ground(study)
-    references = tuple(_references(study, list(displays_by_source.values())))
     apart = targets_a_scene(ground.stacks) if ground.stacks else 1
     tasks = [
         ground.floor(display, condition, target, targets[(i + apart) % len(targets)])
-        for display, condition in references
+        for display, condition in _references(study, [*displays_by_source.values()])
         for i, target in enumerate(targets)
     ]
     for entry in study.methods:
