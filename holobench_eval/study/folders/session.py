@@ -278,16 +278,12 @@ def _advance(study: Study, folder: Path, watch: Lines) -> Advance:
     _bench(study).announce_grid()
     photographer = session_photographer(folder)
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, 1, folder / ARTIFACTS, retry_failed=True)
-    if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
+    methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
+    takes_rounds = "matched" in {entry.exposure for entry in study.methods}  # or a hologram depends on photographs
+    takes_rounds |= any(method.trains or method.camera or method.follows for method in methods)
+    if photographer.wanted and photographer.manifest.rounds and not takes_rounds:
         fault = f"other holograms are computed here than were photographed, and {REPORT}/solved lacks those"
         remedy = "bring the whole folder of the session from where it was exported, or import it there"
         raise UserError(f"{folder}: {fault}; {remedy}")
     patterns = photographer.write_round() if photographer.wanted else []
     return Advance(study, tuple(patterns), outcome)
-
-
-def _takes_rounds(study: Study) -> bool:
-    """Whether a hologram of the study may depend on photographs of others."""
-    methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
-    matched = any(entry.exposure == "matched" for entry in study.methods)
-    return matched or any(method.trains or method.camera or method.follows for method in methods)
