@@ -28,7 +28,7 @@ from ..core.errors import reason
 from ..core.installed import installed, installing, pinned, shipped
 from .output import console
 
-State = Literal["ok", "missing", "warning"]
+State = Literal["ok", "missing", "warning", "broken"]
 
 IMPORTING, ASKING = 180.0, 120.0  # seconds that imports and drivers may take
 LEAST_DISK = 2e9  # bytes; a full-panel study with its captures
@@ -75,20 +75,14 @@ os._exit(0)  # without waiting for what a driver left running
 class Finding:
     """One thing that was looked at.
 
-    what: its name; state: ok, missing (something here does without it) or warning; found: what there is, or why it is
-    not; remedy: what to do, one command where one is enough; core: nothing works without it.
+    what: its name; state: ok, missing (something here does without it), warning, or broken (nothing works without it);
+    found: what there is, or why it is not; remedy: what to do, one command where one is enough.
     """
 
     what: str
     state: State
     found: str
     remedy: str = ""
-    core: bool = False
-
-    @property
-    def broken(self) -> bool:
-        """Whether the core needs it and does not have it."""
-        return self.core and self.state == "missing"
 
 
 def doctor() -> None:
@@ -98,11 +92,11 @@ def doctor() -> None:
     for heading in ("", "", "found"):
         table.add_column(heading, overflow="fold")
     for finding in findings:
-        state = "broken" if finding.broken else finding.state
-        table.add_row(escape(finding.what), f"[{STYLES[state]}]{state}[/]", escape(finding.found))
+        state = f"[{STYLES[finding.state]}]{finding.state}[/]"
+        table.add_row(escape(finding.what), state, escape(finding.found))
     screen.print(table)
     remedies = [f"{finding.what}: {finding.remedy}" for finding in findings if finding.remedy]
-    broken = [finding.what for finding in findings if finding.broken]
+    broken = [finding.what for finding in findings if finding.state == "broken"]
     last = f"broken: {', '.join(broken)}" if broken else "the core is complete; what is missing is optional"
     for line in (*remedies, last):  # never wrapped, so that commands can be copied
         screen.print(line, soft_wrap=True, markup=False)
@@ -137,7 +131,7 @@ def _either(what: str, found: str | None, otherwise: str, remedy: str, state: St
 
 def _python() -> Iterator[Finding]:
     text = f"{platform.python_version()} ({sys.executable}), {platform.system()} {platform.machine()}"
-    yield Finding("Python", "ok", text, core=True)
+    yield Finding("Python", "ok", text)
 
 
 def _packages() -> Iterator[Finding]:
@@ -145,18 +139,20 @@ def _packages() -> Iterator[Finding]:
     modules = {MODULES.get(name, name.replace("-", "_")): name for name in names}
     seen = _ask(LIBRARIES, IMPORTING, *modules)
     if isinstance(seen, str):
-        yield Finding("packages", "missing", f"importing them all {seen}", installing(), core=True)
+        yield Finding("packages", "broken", f"importing them all {seen}", installing())
         return
     for module, name in modules.items():
         wrong = seen["errors"].get(module)
         if wrong is not None:
-            yield Finding(name, "missing", wrong, installing(name), core=True)
+            yield Finding(name, "broken", wrong, installing(name))
         elif name in ("torch", "numpy"):
-            yield Finding(name, "ok", version(name), core=True)
+            yield Finding(name, "ok", version(name))
     complete = len(modules) - len(seen["errors"])
     yield Finding("packages", "ok", f"{complete} of {len(modules)} that the core needs can be imported")
     yield _versions(names)
-    yield _kernel(seen.get("kernel"))
+    fault = seen.get("kernel")
+    why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
+    yield _either("propagation", None if fault else "compiled for this processor", why, installing("numba"))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     yield Finding("CPU", "ok", f"{cores} cores for this process, {seen.get('threads', 'no')} torch threads")
     gpus = seen.get("gpus") or ["none that torch can use; nothing here needs one"]
@@ -172,14 +168,6 @@ def _versions(names: list[str]) -> Finding:
     other = {name: found for name, found in there.items() if found != wanted.get(name, found)}
     told = ", ".join(f"{name} {found} (not {wanted[name]})" for name, found in other.items())
     return _either("versions", None if other else "those of the committed results", told, installing(), "warning")
-
-
-def _kernel(fault: str | None) -> Finding:
-    """Whether propagation is compiled for this processor."""
-    if fault is None:
-        return Finding("propagation", "ok", "compiled for this processor")
-    why = f"by torch, at half the speed: the compiled kernel cannot be had ({fault})"
-    return Finding("propagation", "missing", why, installing("numba"))
 
 
 def _required() -> list[str]:

@@ -43,21 +43,21 @@ def list_(
     if name is None or name in KINDS:
         for kind in [name] if name else KINDS:
             table = Table(title=kind, title_justify="left", show_header=False)
-            for entry, text in KINDS[kind]():
+            for entry, text in KINDS[kind][0]():
                 table.add_row(entry, escape(text))
             screen.print(table)
         return
     of_a_file = "methods" if ".py:" in name else "profiles" if name.endswith((".yaml", ".yml")) else ""
-    found = [of_a_file] if of_a_file else [kind for kind in KINDS if name in dict(KINDS[kind]())]
+    found = [of_a_file] if of_a_file else [kind for kind in KINDS if name in dict(KINDS[kind][0]())]
     if not found:
         raise UserError(_unknown(name))
     for kind in found:
-        EXPLAINED[kind](screen, name)
+        KINDS[kind][1](screen, name)
 
 
 def _unknown(name: str) -> str:
     """What to say of a name that is none."""
-    names = {entry for kind in KINDS for entry, _ in KINDS[kind]()}
+    names = {entry for kind in KINDS for entry, _ in KINDS[kind][0]()}
     near = difflib.get_close_matches(name, [*KINDS, *names], n=1)
     if (within := sorted(entry for entry in names if name in entry)) and not (near and near[0] in KINDS):
         return f"unknown name '{name}'; names with it: {', '.join(within)}"
@@ -250,19 +250,18 @@ MARKS = {
     "privileged": "privileged",
     "training": "for training, never scored",
 }
-KINDS: dict[str, Callable[[], Entries]] = {
-    "studies": studies,
-    "methods": partial(plug_ins, "methods", camera="captures", privileged="privileged"),
-    "datasets": partial(plug_ins, "datasets", training="for training, never scored"),
-    "profiles": profiles,
-    "metrics": metrics,
-    "conditions": conditions,
-}
-EXPLAINED: dict[str, Callable[[Console, str], None]] = {
-    "studies": explain_study,
-    "methods": partial(explain_plug_in, "methods"),
-    "datasets": partial(explain_plug_in, "datasets"),
-    "profiles": explain_profile,
-    "metrics": explain_metric,
-    "conditions": explain_condition,
+# By kind: its names with their descriptions, and what prints all of one.
+KINDS: dict[str, tuple[Callable[[], Entries], Callable[[Console, str], None]]] = {
+    "studies": (studies, explain_study),
+    "methods": (
+        partial(plug_ins, "methods", camera="captures", privileged="privileged"),
+        partial(explain_plug_in, "methods"),
+    ),
+    "datasets": (
+        partial(plug_ins, "datasets", training="for training, never scored"),
+        partial(explain_plug_in, "datasets"),
+    ),
+    "profiles": (profiles, explain_profile),
+    "metrics": (metrics, explain_metric),
+    "conditions": (conditions, explain_condition),
 }

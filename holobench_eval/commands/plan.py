@@ -141,29 +141,27 @@ def preview(
         cells = [cell for task in tasks for cell in task.cells]
         count = Counter(states[cell.id] for cell in cells)
         unsolved = [task for task in tasks if any(states[cell.id] in ("missing", "untimed") for cell in task.cells)]
-        apart = not tasks[0].is_floor and not isolation.runs_inside(
-            tasks[0].cells[0].method, study.folder, study.isolation
-        )
-        kinds = Counter(cost.key(task, threads, workers, gpu, apart) for task in unsolved if not task.is_floor)
+        is_floor, method = tasks[0].is_floor, tasks[0].cells[0].method
+        apart = not is_floor and not isolation.runs_inside(method, study.folder, study.isolation)
+        kinds = Counter(cost.key(task, threads, workers, gpu, apart) for task in unsolved if not is_floor)
         known = {kind: seconds for kind in kinds if (seconds := cost.recorded(kind)) is not None}
         estimates = [known.get(kind, mean(known.values())) * many for kind, many in kinds.items()] if known else []
         targets = len({cell.target for cell in cells})
-        unscored = [record for cell in cells if states[cell.id] == "unscored" and (record := store.read(cell.id))]
+        kept = (store.read(cell.id) for cell in cells if states[cell.id] == "unscored")
+        unscored = [lacking(record.scores, plan.metrics) for record in kept if record]
         rows.append(
             Row(
                 label,
                 conditions=len({cell.condition for cell in cells}),
                 targets=targets,
                 cells=len(cells),
-                photographs=None if label == FLOOR else _photographs(methods[label], study.folder, targets, learning),
+                photographs=None if is_floor else _photographs(methods[label], study.folder, targets, learning),
                 done=count["done"] + count["unscored"],
                 failed=count["failed"],
                 missing=count["missing"] + count["untimed"],
-                seconds=None if label == FLOOR or (kinds and not known) else sum(estimates),
+                seconds=None if is_floor or (kinds and not known) else sum(estimates),
                 unscored=len(unscored),
-                lacking=tuple(
-                    dict.fromkeys(name for record in unscored for name in lacking(record.scores, plan.metrics))
-                ),
+                lacking=tuple(dict.fromkeys(name for names in unscored for name in names)),
             )
         )
     return rows

@@ -12,7 +12,7 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -162,56 +162,37 @@ def open_displays(study: Study) -> None:
             open_display(display, study.seed)
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """The stages of a display, drawn beside the report where they are not there as this code draws them.
+def draw_stages(display: Condition, note: str, seed: int, output: Path) -> None:
+    """Draw the stages of a display beside a report, unless they are there as this code draws them.
 
     note: how its panel was scaled; seed: of the study.
     """
+    from ..core.hashing import digest
+    from ..report.charts.sheet import VERSION, drawn_from, save_sheet
+    from ..study.opening import simulated
+    from ..study.versions import HARNESS
 
-    display: Condition
-    note: str
-    seed: int
-    output: Path
-
-    @property
-    def path(self) -> Path:
-        """The picture."""
-        return self.output / "figures" / f"stages-{self.display.name}.png"
-
-    @property
-    def identity(self) -> str:
-        """What the picture is drawn from."""
-        from ..core.hashing import digest
-        from ..report.charts.sheet import VERSION
-        from ..study.versions import HARNESS
-
-        return digest([self.display.digest, list(self.display.spec.shape), self.seed, HARNESS, VERSION])
-
-    def __call__(self) -> None:
-        """Draw it, unless it is there."""
-        from ..report.charts.sheet import drawn_from, save_sheet
-        from ..study.opening import simulated
-
-        if drawn_from(self.path) != self.identity:
-            save_sheet(simulated(self.display, self.seed), self.note, self.path, self.identity)
+    path = output / "figures" / f"stages-{display.name}.png"
+    identity = digest([display.digest, list(display.spec.shape), seed, HARNESS, VERSION])
+    if drawn_from(path) != identity:
+        save_sheet(simulated(display, seed), note, path, identity)
 
 
-def sheets(study: Study, output: Path) -> list[Sheet]:
-    """The sheet of every display of a study that has stages, of many the first; networks and real ones have none."""
+def sheets(study: Study, output: Path) -> list[partial[None]]:
+    """What draws the stages of each display of a study, of many the first alone; networks and real ones have none."""
     from ..display import load_profile
     from ..report.data.statistics import FEWEST_DISPLAYS
     from ..study.displays import condition
 
     panel, folder, profiles = study.display.panel, study.folder, study.display.profiles
     return [
-        Sheet(display, load_profile(source, folder).scaling_note(panel), study.seed, output)
+        partial(draw_stages, display, load_profile(source, folder).scaling_note(panel), study.seed, output)
         for source in (profiles[:1] if len(profiles) >= FEWEST_DISPLAYS else profiles)
         if not (display := condition(source, panel, folder)).network
     ]
 
 
-def draw_sheets(drawings: list[Sheet], threads: int) -> None:
+def draw_sheets(drawings: list[partial[None]], threads: int) -> None:
     """Draw what no worker has drawn. A picture must not cost the report: what is wrong with one is printed."""
     import torch
 
@@ -220,4 +201,4 @@ def draw_sheets(drawings: list[Sheet], threads: int) -> None:
         try:
             sheet()
         except Exception as error:
-            print(f"holoeval: no stage sheet of {sheet.display.name}: {one_line(str(error))}", file=sys.stderr)
+            print(f"holoeval: no stage sheet of {sheet.args[0].name}: {one_line(str(error))}", file=sys.stderr)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +19,7 @@ from .output import print_answer, print_headline
 
 if TYPE_CHECKING:
     from ..report import Results
+    from ..study.folders.files import Folders
 
 # How files are read.
 VALUES = {
@@ -94,27 +95,12 @@ def score_folders(
     from ..study.running import provenance
     from ..study.store import Store
 
-    if values not in VALUES:
-        raise UserError(f"--values {values}: {suggest(values, VALUES)}")
-    for source in (captures, targets):
-        if output.resolve().is_relative_to(source.resolve()):
-            mixed = f"lies in {source}, whose files it would mix with"
-            raise UserError(f"--output {output}: {mixed}; expected another folder")
-    if visible and aligned:
-        raise UserError("--visible --aligned: an aligned capture shows all of its target; expected one of the two")
-    if dark is not None and values != "linear":
-        raise UserError(
-            f"--dark {dark}: is taken off counts of light, not off encoded values; expected --values linear"
-        )
+    options = {"--captures": captures, "--targets": targets, "--output": output, "--values": values}
+    options |= {"--visible": visible, "--aligned": aligned, "--baseline": baseline, "--dark": dark}
+    _refuse(options)
     taken_off, told = (None, "") if dark is None else given_dark(dark, upright=True)
     folders = read_folders(captures, targets, values == "linear", taken_off)
-    if baseline is not None and baseline not in folders.methods:
-        raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
-    for picture in folders.captures.values():
-        if values == "linear" and picture.is_lossy:
-            raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
-        if values != "linear" and picture.is_linear:
-            raise UserError(f"{picture.path}: RAW files and floating point hold linear light; expected --values linear")
+    _refuse_pictures(folders, values, baseline)
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned, told)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values, told), resumed=True)
@@ -126,10 +112,6 @@ def score_folders(
         for note in notes:
             console.print(note, markup=False, soft_wrap=True)
         known = provenance.end(output, known)
-        words = ["--captures", captures, "--targets", targets, "--output", output, "--values", values]
-        words += ["--visible"] * visible + ["--aligned"] * aligned + (["--baseline", baseline] if baseline else [])
-        words += [] if dark is None else ["--dark", dark]
-        description = Description(command=shlex.join(["holoeval", "score", *map(str, words)]))
         layout = Layout(
             title=f"Scores of photographs: {listed(folders.methods)}",
             pairs=tuple((method, CONDITION) for method in folders.methods),
@@ -141,7 +123,37 @@ def score_folders(
             values=values,
             study=output.resolve().name,
         )
-        return write_report(layout, records, output, known, description)
+        given = {name: value for name, value in options.items() if value not in (None, False, "")}
+        words = [word for name, value in given.items() for word in (name, *([] if value is True else [str(value)]))]
+        command = shlex.join(["holoeval", "score", *words])
+        return write_report(layout, records, output, known, Description(command=command))
+
+
+def _refuse(options: Mapping[str, Any]) -> None:
+    """UserError for options that do not go together."""
+    output, values, dark = options["--output"], options["--values"], options["--dark"]
+    if values not in VALUES:
+        raise UserError(f"--values {values}: {suggest(values, VALUES)}")
+    for source in (options["--captures"], options["--targets"]):
+        if output.resolve().is_relative_to(source.resolve()):
+            mixed = f"lies in {source}, whose files it would mix with"
+            raise UserError(f"--output {output}: {mixed}; expected another folder")
+    if options["--visible"] and options["--aligned"]:
+        raise UserError("--visible --aligned: an aligned capture shows all of its target; expected one of the two")
+    if dark is not None and values != "linear":
+        encoded = "is taken off counts of light, not off encoded values"
+        raise UserError(f"--dark {dark}: {encoded}; expected --values linear")
+
+
+def _refuse_pictures(folders: Folders, values: str, baseline: str | None) -> None:
+    """UserError for captures that are not of such values, and for a baseline that is not among them."""
+    if baseline is not None and baseline not in folders.methods:
+        raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
+    for picture in folders.captures.values():
+        if values == "linear" and picture.is_lossy:
+            raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
+        if values != "linear" and picture.is_linear:
+            raise UserError(f"{picture.path}: RAW files and floating point hold linear light; expected --values linear")
 
 
 def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
@@ -159,7 +171,7 @@ def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:
 @contextmanager
 def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
     """Show every step by its name: a bar on a terminal, else a line every few seconds."""
-    from ..study.running.progress import SECONDS_BETWEEN_LINES
+    from ..study.running.progress import seldom
 
     if console.is_terminal:
         text = TextColumn("{task.description}", markup=False)
@@ -167,13 +179,11 @@ def _steps(console: Console, total: int) -> Iterator[Callable[[str], None]]:
             bar = progress.add_task("reading", total=total, completed=-1)
             yield lambda name: progress.update(bar, description=name, advance=1)
         return
-    last, done = time.monotonic(), 0
+    is_due, steps = seldom(), itertools.count()
 
     def line(name: str) -> None:
-        nonlocal last, done
-        if time.monotonic() - last >= SECONDS_BETWEEN_LINES:
-            last = time.monotonic()
+        done = next(steps)
+        if is_due():
             console.print(f"{done}/{total} steps; now {name}", markup=False, soft_wrap=True)
-        done += 1
 
     yield line

@@ -92,14 +92,14 @@ def _results(step: Callable[[], T], recorder: CudaGraph) -> Iterator[T]:
         # A recording that fails leaves torch's random numbers of a GPU unusable: what would make it fail is looked for.
         first = recorder.run(step, watched=True)
     except RuntimeError:
-        pass  # it waits, and runs as it is from here on
+        pass  # it waits for the device, and runs as it is from here on, where a fault of its own is raised again
     else:
         yield first
         del first
         try:
             result = recorder.record(step)
         except RuntimeError:
-            pass  # it cannot be recorded, or there is no memory for that: as it is, too
+            pass  # it cannot be recorded, or there is no memory for that: as it is, too, where its faults are raised
         else:
             while True:
                 recorder.replay()

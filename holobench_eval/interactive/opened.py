@@ -103,7 +103,11 @@ class OpenDisplay:
         if isinstance(method, np.ndarray | Tensor):
             raise UserError("solve has an array in the place of its method; expected solve(method, target)")
         light = self._target(target)
-        solver, label = self._solver(method, params)
+        own = {name: as_in_config(value) for name, value in params.items()}
+        if isinstance(method, str):
+            solver, label = build("methods", method, own, self._folder), method.rpartition(":")[2]
+        else:
+            solver, label = method_of(method, own)
         if traits_of(solver, label).trains:
             raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
         refuse_plane(traits_of(solver, label), label, self.spec)
@@ -199,12 +203,6 @@ class OpenDisplay:
         except CellError as error:
             raise UserError(f"a {error}") from None
         return shown.to(self._device)
-
-    def _solver(self, method: Any, params: dict[str, Any]) -> tuple[Any, str]:
-        given = {name: as_in_config(value) for name, value in params.items()}
-        if not isinstance(method, str):
-            return method_of(method, given)
-        return build("methods", method, given, self._folder), method.rpartition(":")[2]
 
 
 def open_display(

@@ -98,21 +98,20 @@ class Artifacts:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
         folder = self.folder_of(preparation)
         states = file_state(folder / STATE), file_state(folder / LOG)
-        try:
-            described = (folder / PROVENANCE).read_bytes() if states[0] else None
-        except OSError:
-            described = None
-        if described is None:
+        if states[0] is None or not (folder / PROVENANCE).is_file():
             raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; {AGAIN}")
-        artifact = _loaded(folder, states, described)
-        check_matches(folder, artifact.provenance, preparation)
+        artifact = _loaded(folder, states, (folder / PROVENANCE).read_bytes())
+        trained, wanted = artifact.provenance["description"], preparation.description()
+        for key in wanted:
+            if trained.get(key) != wanted[key]:
+                own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
+                found = f"trained for {key.replace('_', ' ')} {other}, this study needs {own}"
+                raise UserError(f"{folder}: {found}; delete it, or give --retrain")
         return artifact
 
     def write(self, preparation: Preparation, state: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
         """Keep a learned state; facts: further entries of its provenance. The unfinished training is removed."""
-        folder, buffer = self.folder_of(preparation), io.BytesIO()
-        torch.save({"format": FORMAT, "state": dict(state)}, buffer)
-        content = buffer.getvalue()
+        folder, content = self.folder_of(preparation), packed({"format": FORMAT, "state": dict(state)})
         write_atomically(folder / STATE, content)
         sha256 = hashlib.sha256(content).hexdigest()
         described = {
@@ -140,14 +139,6 @@ class Artifacts:
         write_atomically(self.folder_of(preparation) / FAILURE, text.encode("utf-8", "backslashreplace"))
         return line
 
-    def has_failed(self, preparation: Preparation) -> bool:
-        """Whether the last attempt to make the artifact failed."""
-        return (self.folder_of(preparation) / FAILURE).is_file()
-
-    def forget_failure(self, preparation: Preparation) -> None:
-        """Remove the note of a failure: the training goes on."""
-        (self.folder_of(preparation) / FAILURE).unlink(missing_ok=True)
-
     def failure(self, preparation: Preparation) -> str:
         """The reason why an artifact is missing, in one line."""
         try:
@@ -169,10 +160,6 @@ class Artifacts:
         """Where an unfinished training is kept."""
         return FolderMemory(self.folder_of(preparation))
 
-    def journal(self, preparation: Preparation) -> Journal:
-        """The captures of an unfinished training, those of attempts that failed included."""
-        return self.memory(preparation).journal
-
 
 @dataclass(frozen=True)
 class FolderMemory:
@@ -187,9 +174,7 @@ class FolderMemory:
 
     def save(self, name: str, value: dict[str, Any]) -> None:
         """Write a value; an interrupted write leaves the earlier file."""
-        buffer = io.BytesIO()
-        torch.save(value, buffer)
-        write_atomically(self._path(name), buffer.getvalue())
+        write_atomically(self._path(name), packed(value))
 
     def log(self, row: Mapping[str, float | int | str]) -> None:
         """Add a row to ``training.csv``, ordered by round and step; rows of the same round and step are merged."""
@@ -205,12 +190,12 @@ class FolderMemory:
         text = io.StringIO()
         writer = csv.DictWriter(text, list(dict.fromkeys(key for entry in rows for key in entry)), lineterminator="\n")
         writer.writeheader()
-        writer.writerows([{key: value or "" for key, value in entry.items()} for entry in rows])
+        writer.writerows(rows)
         write_atomically(self.folder / LOG, text.getvalue().encode())
 
     @property
     def journal(self) -> Journal:
-        """The captures that the training took."""
+        """The captures that the training took, those of attempts that failed included."""
         return Journal(self.folder / UNFINISHED / "captures")
 
     def _path(self, name: str) -> Path:
@@ -229,6 +214,13 @@ def read_log(folder: Path) -> list[dict[str, str]]:
             return list(csv.DictReader(file))
     except FileNotFoundError:
         return []
+
+
+def packed(value: dict[str, Any]) -> bytes:
+    """Tensors and plain values as what a file holds, for ``read_tensors``."""
+    buffer = io.BytesIO()
+    torch.save(value, buffer)
+    return buffer.getvalue()
 
 
 def read_tensors(path: Path, file: IO[bytes] | None = None) -> dict[str, Any]:
@@ -282,16 +274,6 @@ def _provenance(path: Path, text: bytes) -> dict[str, Any]:
         if not isinstance(content.get(key), kind):
             raise UserError(f"{path}: has no valid '{key}'; {AGAIN}")
     return content
-
-
-def check_matches(folder: Path, provenance: Mapping[str, Any], preparation: Preparation) -> None:
-    """UserError for a state trained for another description; it names the first entry that differs."""
-    trained, wanted = provenance["description"], preparation.description()
-    for key in wanted:
-        if trained.get(key) != wanted[key]:
-            own, other = (shorten(json.dumps(value), 80) for value in (wanted[key], trained.get(key)))
-            found = f"trained for {key.replace('_', ' ')} {other}, this study needs {own}"
-            raise UserError(f"{folder}: {found}; delete it, or give --retrain")
 
 
 @dataclass(frozen=True)

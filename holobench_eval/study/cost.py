@@ -24,7 +24,6 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 import torch
@@ -65,28 +64,42 @@ class Cost:
         )
 
 
-@dataclass(frozen=True)
 class Stopwatch:
-    """Started by ``start()``, read by ``stop()``.
+    """Resets the peak of memory and starts the clock; read by ``stop()``.
 
-    before: memory at the start, resident [KiB] or of a GPU [bytes] (None: not measured); clock, cpu: wall and processor
-    time at the start [s]; process: number of the one that is measured, None for this one; peak: of its memory.
+    The allocator of this process is trimmed first, so that reused memory shows as growth (but for the end of its memory
+    in a process whose program break could not be raised: glibc keeps that).
+
+    device: where the solution is computed; process: the number of the one that computes it, None for this one. What
+    another process takes on a GPU is not measured. before: memory at the start, resident [KiB] or of a GPU [bytes]
+    (None: not measured).
     """
 
-    before: int | None
-    clock: float
-    cpu: float | None
-    device: torch.device = CPU
-    process: int | None = None
-    peak: _Peak | None = None
+    def __init__(self, device: torch.device = CPU, process: int | None = None) -> None:
+        self.device, self.process = device, process
+        self.before: int | None = None
+        self.peak: _Peak | None = None
+        if process is None:
+            gc.collect()
+            _freeze()
+            give_back_freed_memory()
+        self.on_gpu = device.type == "cuda" and process is None
+        if self.on_gpu:
+            torch.cuda.synchronize(device)
+            torch.cuda.reset_peak_memory_stats(device)
+            self.before = torch.cuda.memory_allocated(device)
+        elif device.type != "cuda" and _set_back(process):
+            self.before = _status("VmRSS", process)
+        if process is not None and self.before is not None:
+            self.peak = _Peak(process)
+        self.clock, self.cpu = time.perf_counter(), _cpu(process)
 
     def stop(self) -> Cost:
         """The cost since the start; of another process since its fork."""
-        on_gpu = self.device.type == "cuda" and self.process is None
-        if on_gpu:
+        if self.on_gpu:
             torch.cuda.synchronize(self.device)
         seconds, cpu, memory = time.perf_counter() - self.clock, _cpu(self.process), None
-        if on_gpu and self.before is not None:
+        if self.on_gpu and self.before is not None:
             memory = (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB
         elif self.before is not None:
             peak = self.peak.end() if self.peak else _status("VmHWM", None)
@@ -97,26 +110,6 @@ class Stopwatch:
             return Cost(seconds, memory, cpu - self.cpu)
         before = self.cpu if self.device.type == "cpu" else 0.0  # to open a GPU takes longer than many solutions
         return Cost(seconds + before, memory, cpu)
-
-
-def start(device: torch.device = CPU, process: int | None = None) -> Stopwatch:
-    """Reset the peak of memory and start the clock. device: where the solution is computed; process: the number of the
-    one that computes it, None for this one. What another process takes on a GPU is not measured.
-
-    The allocator of this process is trimmed first, so that reused memory shows as growth (but for the end of its memory
-    in a process whose program break could not be raised: glibc keeps that).
-    """
-    if process is None:
-        gc.collect()
-        _freeze()
-        give_back_freed_memory()
-    if device.type == "cuda" and process is None:
-        torch.cuda.synchronize(device)
-        torch.cuda.reset_peak_memory_stats(device)
-        return Stopwatch(torch.cuda.memory_allocated(device), time.perf_counter(), _cpu(None), device)
-    before = _status("VmRSS", process) if device.type != "cuda" and _set_back(process) else None
-    peak = None if process is None or before is None else _Peak(process)
-    return Stopwatch(before, time.perf_counter(), _cpu(process), device, process, peak)
 
 
 class _Peak(threading.Thread):
@@ -210,18 +203,10 @@ def folder() -> Path:
 @cache
 def cpu_model() -> str:
     """The processor's name, or its architecture where the system gives no name."""
-    try:
+    with suppress(OSError, StopIteration):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or platform.machine()
-
-
-@cache
-def _torch() -> str:
-    """The version of torch, cached: reading its metadata takes longer than the rest of ``key``."""
-    return version("torch")
+        return next(line for line in lines if line.startswith("model name")).partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def timed(study: Study, plan: Plan) -> frozenset[str]:
@@ -246,7 +231,7 @@ def key(task: Task, threads: int, workers: int, gpu: str = "", apart: bool = Fal
     phase = task.cells[0].phase
     kind = {name: phase.get(name) for name in KIND} | {"planes": len(phase.get("planes", ()))}
     machine = [cpu_model(), platform.machine(), threads, workers, *filter(None, (gpu, "apart" * apart))]
-    return digest([kind, task.cells[0].measure, machine, _torch(), __version__])
+    return digest([kind, task.cells[0].measure, machine, torch.__version__, __version__])
 
 
 def recorded(name: str) -> float | None:

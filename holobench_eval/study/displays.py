@@ -17,7 +17,6 @@ from ..lab.bench_file import load_bench_file
 from ..lab.session import read_manifest
 from . import isolation
 from .definition import LEARNED, Study, Training
-from .isolation.read_files import external
 from .versions import dataset_version, method_version
 
 Panel = tuple[int, int]
@@ -159,7 +158,9 @@ def preparation(study: Study, method: str, params: Mapping[str, Any], display: C
         images=study.training_images,
         seed=study.seed,
         images_version=dataset_version(dataset, plugins.find("datasets", dataset, study.folder)),
-        external=external(isolation.build(method, params, study.folder)) if "external" in traits.functions else {},
+        external=isolation.external(isolation.build(method, params, study.folder))
+        if "external" in traits.functions
+        else {},
     )
 
 

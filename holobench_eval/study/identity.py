@@ -15,7 +15,7 @@ as weights of a metric, is in the name of nothing that does not use it.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -167,16 +167,11 @@ def grouped(columns: Mapping[str, float], metrics: Mapping[str, str]) -> dict[st
         columns = {"match_factor" if name == "scale_0" else name: value for name, value in columns.items()}
     by_name: dict[str, Plain] = {name: {"version": version, "values": {}} for name, version in metrics.items()}
     for column, value in columns.items():
-        owner = _owner(column, names)
+        of = (name for name in names if column == name or column.startswith(f"{name}_"))
+        owner = INFOCUS if column.endswith(f"_{INFOCUS}") else next(of, MATCH)
         if owner in by_name:
             by_name[owner]["values"][column] = value
     return by_name
-
-
-def _owner(column: str, names: Sequence[str]) -> str:
-    if column.endswith(f"_{INFOCUS}"):
-        return INFOCUS
-    return next((name for name in names if column == name or column.startswith(f"{name}_")), MATCH)
 
 
 def lacking(scores: Mapping[str, Any], metrics: Mapping[str, str]) -> dict[str, str]:

@@ -17,7 +17,7 @@ from ..display import Profile
 from ..display.learned import LearnedBench
 from ..display.simulated.network import LARGEST
 from ..methods.twin.to_profile import write_learned
-from .artifacts import read_tensors
+from .artifacts import packed, read_tensors
 from .versions import method_version
 
 SHIPPED = "expected a method of this package that trains and predicts captures"
@@ -56,13 +56,11 @@ def write_network(
     base: its name, version, nominal panel, and what is known of it. UserError: a method that is not of this
     package, or a file of more than 100 MB.
     """
-    version, stem, buffer = method_version(type(predictor(method, params))), file_name(base.name), io.BytesIO()
-    torch.save({"state": dict(state)}, buffer)
-    content = buffer.getvalue()
+    version, content = method_version(type(predictor(method, params))), packed({"state": dict(state)})
     if len(content) > LARGEST:
         raise UserError(f"{method} has learned {len(content) / 1e6:.0f} MB; a display has at most {LARGEST / 1e6:g} MB")
     facts = {"method": method, "version": version, "params": dict(params)}
-    return write_learned(base, {}, "network", facts, f"{stem}.pt", content, folder)
+    return write_learned(base, {}, "network", facts, f"{file_name(base.name)}.pt", content, folder)
 
 
 def predictor(name: str, params: Mapping[str, Any]) -> Any:

@@ -21,13 +21,11 @@ from ..display.account import Journal
 from ..display.metered import Solver
 from ..display.traits import traits_of
 from . import isolation
-from .artifacts import read_tensors
+from .artifacts import packed, read_tensors
 from .cost import Cost
 from .versions import method_version
 
 RESULTS = "holoeval-results"  # the folder of all studies that are given no other
-# Of a solution, beside its cost.
-KEPT = ("phase", "captures", "stopped", "learned", "alone", "covered", "uncovered", "shown")
 LEVELS = 2**16  # of a start, to a turn: steps of 0.1 mrad, a 256th of the finest that a panel of 8 bits shows
 
 
@@ -95,10 +93,9 @@ class Phases:
 
     def keep(self, identity: str, solution: Solution) -> None:
         """Keep a solution, in the place of an earlier one, and close its account."""
-        content = {**{name: getattr(solution, name) for name in KEPT}, "cost": asdict(solution.cost)}
-        buffer = io.BytesIO()
-        torch.save(content, buffer)
-        write_atomically(self.path(identity), sealed(buffer.getvalue(), identity), lasting=solution.captures > 0)
+        content = {name: value for name, value in vars(solution).items() if name != "reused"}
+        file = sealed(packed(content | {"cost": asdict(solution.cost)}), identity)
+        write_atomically(self.path(identity), file, lasting=solution.captures > 0)
         self.journal(identity).close()
 
     def remove(self, identities: Iterable[str]) -> None:

@@ -16,8 +16,7 @@ from ..display.traits import traits_of
 from . import identity, isolation
 from .definition import Measure, MethodEntry, Study
 from .displays import Condition, Preparation, changed, displays, preparation
-from .isolation import read_files
-from .stacks import Showing, Target, at_once, given_views, offset, showings, stacks_of, targets_a_scene
+from .stacks import Showing, Target, at_once, given_views, offset, sharing, showings, stacks_of, targets_a_scene
 from .versions import HARNESS, dataset_version, method_version
 
 REFERENCE = "reference"  # the condition of the floor cells, see ``reference_of``
@@ -186,20 +185,20 @@ def plan(study: Study) -> Plan:
     targets = [(item, study.dataset.digest(item)) for item in study.items]
     displays_by_source = displays(study)
     ground = _Ground(study)
-    references = tuple(_references(study, list(displays_by_source.values())))
     apart = targets_a_scene(ground.stacks) if ground.stacks else 1
     tasks = [
         ground.floor(display, condition, target, targets[(i + apart) % len(targets)])
-        for display, condition in references
+        for display, condition in _references(study, [*displays_by_source.values()])
         for i, target in enumerate(targets)
     ]
     for entry in study.methods:
-        entry_displays = [
-            display for source in entry.profiles for display in changed(study, source, displays_by_source[source])
-        ]
-        tasks += ground.solutions(entry, entry_displays, targets)
+        shown = [changed(study, source, displays_by_source[source]) for source in entry.profiles]
+        tasks += ground.solutions(entry, [display for each in shown for display in each], targets)
     grid = Plan(tuple(following(tasks, study.folder)), identity.scores_of(study))
-    check_unseen(grid.preparations(), targets)
+    scored = {sha256: name for name, sha256 in targets}
+    for item, sha256 in (image for training in grid.preparations().values() for image in training.images):
+        if sha256 in scored:
+            raise UserError(f"training image '{item}' is the scored target '{scored[sha256]}'; train on others")
     return grid
 
 
@@ -227,14 +226,20 @@ class _Ground:
         code = dataset_version(chosen.dataset, type(dataset))
         return {"dataset": chosen.dataset.rpartition(":")[2], "params": params, **({"code": code} if code else {})}
 
-    def cell(self, phase: Mapping[str, Any], shown_on: Condition | None, display: Condition, **further: Any) -> Cell:
-        """A cell; ``display``: gives the size of the scored region, also of a floor image that needs no display."""
+    def cell(self, phase: Mapping[str, Any], display: Condition, target: Target, code: str, **further: Any) -> Cell:
+        """A cell; ``display``: gives the size of the scored region, also of a floor image that needs no display.
+
+        A floor image, which has no code, is shown on none unless it is compared with the captures of one.
+        """
         study = self.study
         return Cell(
             phase,
-            shown_on,
+            display if code or study.predicts else None,
+            code=code,
             dataset=study.targets.dataset,
             dataset_params=study.targets.params,
+            target=target[0],
+            target_sha256=target[1],
             profile=display.name,
             profile_version=display.version,
             panel=display.spec.shape,
@@ -248,43 +253,35 @@ class _Ground:
         """A task for every solution of a method: target by target, repeat by repeat."""
         study, cls = self.study, isolation.find(entry.name, self.study.folder)
         solved = {target: self._solved(target) for target in targets}
-        read = read_files.of(entry, study.folder, cls, dict.fromkeys(name for name, _ in solved.values()))
+        read = isolation.files_read(entry, study.folder, dict.fromkeys(name for name, _ in solved.values()))
         for showing in self._showings(cls, entry_displays, targets):
             conditions = tuple(display for _, display in showing)
             first = conditions[0].nominal if self.stacks else conditions[0]
             own = preparation(study, entry.name, entry.params, first.nominal)
+            learned, planes = own.id if own else "", self._planes(cls, showing, first)
+
             for repeat in range(study.repeats):
-                cells = (
-                    self.cell(
-                        self._phase(
-                            cls,
-                            entry.params,
-                            solved[showing[0][0]],
-                            first,
-                            repeat,
-                            learned=own.id if own else "",
-                            files=read[solved[target][0]],
-                            planes=self._planes(cls, showing, first),
-                            captures=entry.captures,
-                            predicts=self._holograms(first, target, repeat).get("phase"),
-                        ),
+                cells = list[Cell]()
+                for target, display in showing:
+                    both = {"files": read[solved[target][0]], "captures": entry.captures}
+                    holograms = self._holograms(display, target, repeat)  # a prediction has a task for each display
+                    further = {**both, "learned": learned, "planes": planes, "predicts": holograms.get("phase")}
+                    phase = self._phase(cls, entry.params, solved[showing[0][0]], first, repeat, **further)
+                    cell = self.cell(
+                        phase,
                         display,
-                        display,
+                        target,
                         method=entry.name,
                         code=method_version(cls),
                         params=entry.params,
-                        target=target[0],
-                        target_sha256=target[1],
                         condition=display.name if self.stacks else display.title,  # planes and views share a row
                         repeat=repeat,
-                        prepared=_ids(own, display.learned),
-                        captures=entry.captures,
+                        prepared=tuple(training.id for training in (own, display.learned) if training),
                         exposure=entry.exposure or study.display.exposure,
-                        holograms=self._holograms(display, target, repeat),
-                        files=read[solved[target][0]],
+                        holograms=holograms,
+                        **both,
                     )
-                    for target, display in showing
-                )
+                    cells.append(cell)
                 yield Task(entry.label, tuple(cells), conditions, own)
 
     def _phase(
@@ -324,14 +321,13 @@ class _Ground:
         probe = self.study.holograms
         if not self.study.predicts:
             return {}
-        cls, files = type(self.probe), read_files.digests(self.probe, target[0])
+        cls, files = type(self.probe), isolation.digests(self.probe, target[0])
         phase = self._phase(cls, probe.params, target, display, repeat, files=files)
         return {"name": probe.name, "params": probe.params, "code": method_version(cls), "files": files, "phase": phase}
 
     def _showings(self, cls: type[Any], entry_displays: list[Condition], targets: list[Target]) -> Iterator[Showing]:
         """The targets and displays of each solution."""
-        apart = [[display] for display in entry_displays]
-        for group in apart if self.study.predicts else _sharing(cls, entry_displays):
+        for group in sharing(cls, entry_displays, self.study.predicts):
             if self.stacks:
                 yield from showings(cls, group, targets, self.stacks, self.study.measure)
             else:
@@ -352,17 +348,15 @@ class _Ground:
         cells = tuple(
             self.cell(
                 {"floor": name, **made_of, **({"wrong": wrong[1]} if own else {})},
-                display if study.predicts else None,  # whose captures the images are compared with
                 display,
+                target,
                 method=name,
                 code="",
                 params=own,
-                target=target[0],
-                target_sha256=target[1],
                 condition=condition,
                 repeat=0,
                 exposure=study.display.exposure,
-                prepared=_ids(display.learned),
+                prepared=(display.learned.id,) if display.learned else (),
                 holograms=holograms | ({"wrong": self._holograms(display, wrong, 0)} if own and holograms else {}),
             )
             for name, own in params.items()
@@ -375,34 +369,11 @@ def _references(study: Study, shown: Sequence[Condition]) -> Iterator[tuple[Cond
 
     Predictions are compared with captures, and their floor with those of the first display alone.
     """
-
-    def size(display: Condition) -> tuple[object, ...]:
-        return display.spec.region.shape, len(display.spec.wavelengths)
-
+    first, *others = [(display.spec.region.shape, len(display.spec.wavelengths)) for display in shown]
     yield shown[0], REFERENCE
-    for display in () if study.predicts else shown[1:]:
-        if size(display) != size(shown[0]):
+    for display, size in zip(shown[1:], others, strict=True):
+        if size != first and not study.predicts:
             yield display, reference_of(display.name)
-
-
-def _ids(*trainings: Preparation | None) -> tuple[str, ...]:
-    return tuple(training.id for training in trainings if training is not None)
-
-
-def _sharing(cls: type[Any], entry_displays: list[Condition]) -> list[list[Condition]]:
-    """Displays grouped so that the displays of a group share a solution.
-
-    A method that neither captures nor trains nor is privileged knows only the nominal optics, so displays with equal
-    nominal optics get the same phase. A trained method knows the display before any change. A method that captures or
-    is privileged solves on each display as it is.
-    """
-    traits = traits_of(cls)
-    if traits.camera or traits.privileged:
-        return [[display] for display in entry_displays]
-    groups = defaultdict[Any, list[Condition]](list)
-    for display in entry_displays:
-        groups[(display.name, display.spec) if traits.trains else replace(display.spec, name="")].append(display)
-    return list(groups.values())
 
 
 def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
@@ -427,12 +398,3 @@ def following(tasks: Sequence[Task], folder: Path) -> Iterator[Task]:
 
     for task in tasks:
         yield replace(task, cells=tuple(map(started, task.cells))) if follows(task) else task
-
-
-def check_unseen(preparations: Mapping[str, Preparation], targets: list[tuple[str, str]]) -> None:
-    """Refuse a study that scores an image it trains on. targets: name and digest of each. UserError names the image."""
-    scored = {sha256: name for name, sha256 in targets}
-    for training in preparations.values():
-        for item, sha256 in training.images:
-            if sha256 in scored:
-                raise UserError(f"training image '{item}' is the scored target '{scored[sha256]}'; train on others")

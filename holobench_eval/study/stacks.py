@@ -3,6 +3,7 @@ share a hologram (paper 7.1)."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -60,6 +61,22 @@ def at_once(method: Traits, measure: str) -> bool:
     return {"focus": method.planes, "views": method.views}.get(measure, False)
 
 
+def sharing(cls: type[Any], entry_displays: list[Condition], apart: bool) -> list[list[Condition]]:
+    """Displays grouped so that the displays of a group share a solution.
+
+    A method that neither captures nor trains nor is privileged knows only the nominal optics, so displays with equal
+    nominal optics get the same phase. A trained method knows the display before any change. A method that captures or
+    is privileged solves on each display as it is. apart: whether all do.
+    """
+    traits = traits_of(cls)
+    if apart or traits.sees:
+        return [[display] for display in entry_displays]
+    groups = defaultdict[Any, list[Condition]](list)
+    for display in entry_displays:
+        groups[(display.name, display.spec) if traits.trains else replace(display.spec, name="")].append(display)
+    return list(groups.values())
+
+
 def showings(
     method: type[Any], group: Sequence[Condition], targets: Sequence[Target], stacks: Stacks, measure: str
 ) -> Iterator[Showing]:
@@ -80,9 +97,9 @@ def showings(
         for target in targets:
             yield [(target, _at(display, LENS, stacks[target[0]][1])) for display in group]
     else:
-        alike: dict[float, list[Condition]] = {}
+        alike = defaultdict[float, list[Condition]](list)
         for display in group:
-            alike.setdefault(offset(display, {STAYS: 1.0}), []).append(display)
+            alike[offset(display, {STAYS: 1.0})].append(display)
         for planes in by_scene:
             for subgroup in alike.values():
                 yield [(target, _at(display, STAYS, stacks[target[0]][1])) for target in planes for display in subgroup]

@@ -198,7 +198,10 @@ class Store:
 
         def state(cell: Cell) -> State:
             record = self.read(cell.id) if cell.id in recorded else None
-            if record is None or isolation.changed(record.reads, folder) or _has_unlearned(cell, record, networks):
+            if record is None or isolation.changed(record.reads, folder):
+                return "missing"
+            learned = (record.learned or {}).get("sha256")  # of what there is none now, it is taken for the same
+            if learned is not None and networks.get(cell.prepared[0], learned) != learned:
                 return "missing"
             if record.state != "done":
                 return record.state
@@ -220,12 +223,6 @@ class Store:
             for left in self.folder.glob(f"{TEMPORARY}*"):
                 left.unlink()
             yield
-
-
-def _has_unlearned(cell: Cell, record: Record, networks: Mapping[str, str]) -> bool:
-    """Whether the method of a record had learned something else than it has now; not so where nothing is there now."""
-    learned = (record.learned or {}).get("sha256")
-    return learned is not None and networks.get(cell.prepared[0], learned) != learned
 
 
 def late() -> float:

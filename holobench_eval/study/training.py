@@ -26,11 +26,10 @@ from ..display.training import TrainingBench, TrainingImage
 from ..display.traits import traits_of
 from ..lab.real import RealBench
 from . import isolation, opening
-from .artifacts import LOG, RECORDS, Artifacts, provenance_of
+from .artifacts import FAILURE, LOG, RECORDS, Artifacts, provenance_of
 from .displays import Preparation
 from .identity import basis
-from .isolation.read_files import external
-from .isolation.reads import reads_of_dataset
+from .isolation.reads import reads_of
 from .phases import Starts, phases_of
 from .plan import Plan
 from .scoring.job import Setting
@@ -60,7 +59,7 @@ def train(job: TrainingJob) -> str:
         except StopError:
             raise
         except Pending:
-            artifacts.forget_failure(job.preparation)
+            (artifacts.folder_of(job.preparation) / FAILURE).unlink(missing_ok=True)  # the training goes on
             return WAITS
         except (Exception, SystemExit) as error:
             return artifacts.fail(job.preparation, error)
@@ -68,41 +67,40 @@ def train(job: TrainingJob) -> str:
 
 
 def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None:
-    preparation, setting = job.preparation, job.setting
-    limits = replace(setting.limits, seconds=math.inf)  # that of time is for cells
-    method = isolation.solver(preparation.method, preparation.params, preparation.folder, setting.isolation, limits)
-    gate(method, preparation.method, preparation.version, external(method), preparation.external)
+    preparation, setting, study = job.preparation, job.setting, job.setting.study
+    limits = replace(study.limits, seconds=math.inf)  # that of time is for cells
+    method = isolation.solver(preparation.method, preparation.params, study.folder, study.isolation, limits)
+    gate(method, preparation.method, preparation.version, isolation.external(method), preparation.external)
     with recorded() if preparation.images_version else nullcontext(Seen()) as seen:
         dataset, images = _images(preparation, device)
-    read = reads_of_dataset(dataset, seen).covered
+    read = reads_of(dataset, plugins.params_of, seen).covered
     split = len(images) - preparation.training.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
     source = {"dataset": preparation.training.dataset, "params": dict(preparation.training.params)}
     source |= {"code": preparation.images_version} if preparation.images_version else {}
     draw, spec = ("training", preparation.seed), preparation.display.spec
-    phases = phases_of(setting.output, setting.folder)
+    phases = phases_of(setting.output, study.folder)
     shared = {
         item: Starts(phases, basis({**source, "sha256": sha256}, spec, draw), device, read)
         for item, sha256 in preparation.images
     }
     # Photographs in the folder of a session are found again by each import, and so are no new captures.
-    journal = None if preparation.display.in_session else artifacts.journal(preparation)
+    memory = artifacts.memory(preparation)
+    journal = None if preparation.display.in_session else memory.journal
     bench = TrainingBench(
         display_bench,
         preparation.method,
         images[:split],
         images[split:],
-        artifacts.memory(preparation),
+        memory,
         0 if "blind" in traits_of(method).functions and method.blind() else preparation.training.captures,
         preparation.seed,
         shared,
         journal,
         "none" if preparation.display.in_session else "opened" if preparation.display.real else "kept",
     )
-    with (
-        guarded(preparation.method, setting.isolation, preparation.display, preparation.seed),
-        isolation.opened(method, device) as ready,
-    ):
+    guard = guarded(preparation.method, study, preparation.display)
+    with guard, isolation.opened(method, device) as ready:
         state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")

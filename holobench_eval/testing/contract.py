@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import torch
@@ -15,8 +17,9 @@ from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
 from ..display.api import from_numpy, is_plain, type_name
-from ..display.training import TrainingBench, TrainingImage, Value
+from ..display.training import TrainingBench, TrainingImage
 from ..display.traits import traits_of
+from ..study.artifacts import FolderMemory
 from ..study.opening import open_bench
 from ..study.versions import method_version
 
@@ -83,25 +86,14 @@ def _target(bench: CalibratedBench, images: int, channels: int) -> Tensor:
     return target.clamp(0, 1)
 
 
-class _NoMemory:
-    """Of a training that nobody resumes."""
-
-    def load(self, name: str) -> None:
-        return None
-
-    def save(self, name: str, value: Value) -> None:
-        pass
-
-    def log(self, row: Mapping[str, float | int | str]) -> None:
-        pass
-
-
 def _learned(method: Any, bench: CalibratedBench) -> Mapping[str, Any]:
     name = type(method).__name__
     assert callable(getattr(method, "prepare", None)), f"{name} declares trains = True, but has no method 'prepare'"
     targets = _target(bench, images=3, channels=3)
     images = [TrainingImage(f"image {number}", target) for number, target in enumerate(targets)]
-    learned = method.prepare(TrainingBench(bench, name, images[:2], images[2:], _NoMemory(), None, seed=0))
+    with TemporaryDirectory() as folder:
+        memory = FolderMemory(Path(folder))
+        learned = method.prepare(TrainingBench(bench, name, images[:2], images[2:], memory, None, seed=0))
     assert isinstance(learned, Mapping), f"{name}.prepare returned {type_name(learned)}, not a mapping of tensors"
     return learned
 

@@ -69,8 +69,8 @@ def load_subject(source: str) -> Subject:
     except TypeError as error:
         wanted = f"{name}(shape, pitch, wavelength, distance)"
         raise UserError(f"propagator '{source}' cannot be called as {wanted}: {error}") from error
-    except ValueError:  # a callable without a signature; the checks will tell
-        pass
+    except ValueError:
+        pass  # one of C, which tells no signature: where it cannot be called so, each check that calls it says so
     physics: Any = getattr(make, "physics", "exact")
     band: Any = getattr(make, "band", BAND)
     if physics not in get_args(Physics):

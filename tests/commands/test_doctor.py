@@ -62,9 +62,7 @@ def test_a_machine_without_the_compiler_gets_one_line_and_is_not_broken(quick):
     fault = {"errors": {}, "threads": 2, "gpus": [], "kernel": "ModuleNotFoundError: No module named 'numba'"}
     quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else fault)
     lines = [each for each in examine() if "numba" in each.what + each.found + each.remedy]
-    assert [(each.what, each.state, each.remedy, each.broken) for each in lines] == [
-        ("propagation", "missing", installing("numba"), False)
-    ]
+    assert [(each.what, each.state, each.remedy) for each in lines] == [("propagation", "missing", installing("numba"))]
 
 
 def test_versions_that_differ_from_the_pinned_ones_are_told_with_the_constraints_that_ship(quick):
@@ -104,7 +102,7 @@ def test_commands_are_printed_whole_for_copying(quick, capsys):
 def test_a_package_that_cannot_be_imported_is_broken_and_exits_1(quick, capsys):
     errors = {"kornia": "ImportError: no symbol"}
     quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else {"errors": errors})
-    assert named(examine(), "kornia") == Finding("kornia", "missing", errors["kornia"], installing("kornia"), core=True)
+    assert named(examine(), "kornia") == Finding("kornia", "broken", errors["kornia"], installing("kornia"))
     assert exit_code() == 1
     assert capsys.readouterr().out.splitlines()[-1] == "broken: kornia"
 

@@ -48,10 +48,10 @@ def test_every_parameter_of_what_ships_has_a_meaning(kind: plugins.Kind) -> None
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
     """All that ``holoeval list`` and ``holoeval list NAME`` print, in one line each, without links and paths."""
-    found, entries = {}, {kind: list(listed()) for kind, listed in KINDS.items()}
+    found, entries = {}, {kind: list(listed()) for kind, (listed, _) in KINDS.items()}
     with pytest.MonkeyPatch.context() as patch:
         for kind, known in entries.items():  # which every page would load anew
-            patch.setitem(KINDS, kind, partial(iter, known))
+            patch.setitem(KINDS, kind, (partial(iter, known), KINDS[kind][1]))
         for name in (None, *(name for known in entries.values() for name, _ in known)):
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 list_(name)

@@ -266,7 +266,7 @@ def test_a_gpu_repeats_itself() -> None:
 
 
 def test_memory_is_that_of_the_gpu() -> None:
-    watch = cost.start(CUDA)
+    watch = cost.Stopwatch(CUDA)
     held = torch.ones(48 * 2**18, device=CUDA)
     taken = watch.stop()
     assert held.any()

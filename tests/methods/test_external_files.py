@@ -11,7 +11,7 @@ import pytest
 from holobench_eval.core import plugins
 from holobench_eval.methods.learned import retrieval
 from holobench_eval.study.config import load_study
-from holobench_eval.study.isolation.read_files import external
+from holobench_eval.study.isolation import external
 from holobench_eval.study.plan import plan
 
 LPIPS, VGG = "LPIPS weights (AlexNet)", "VGG-19 weights"

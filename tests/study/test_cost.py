@@ -26,7 +26,7 @@ def touched(mib: int) -> float:
 
 
 def peak_of_what_is_let_go() -> cost.Cost:
-    watch = cost.start()
+    watch = cost.Stopwatch()
     touched(LARGE)
     return watch.stop()
 
@@ -34,7 +34,7 @@ def peak_of_what_is_let_go() -> cost.Cost:
 def peak_beside_what_is_held() -> cost.Cost:
     held = np.ones(LARGE * 2**17)
     touched(LARGE)
-    watch = cost.start()
+    watch = cost.Stopwatch()
     touched(4)
     taken = watch.stop()
     assert held.any()
@@ -44,7 +44,7 @@ def peak_beside_what_is_held() -> cost.Cost:
 def peak_of_what_is_taken_again() -> cost.Cost:
     pieces = [np.ones(2**13) for _ in range(LARGE * 16)]  # small, so that the allocator keeps them
     del pieces
-    watch = cost.start()
+    watch = cost.Stopwatch()
     pieces = [np.ones(2**13) for _ in range(LARGE * 16)]
     taken = watch.stop()
     assert len(pieces) == LARGE * 16
@@ -70,7 +70,7 @@ def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_ta
 
 def test_without_the_linux_files_time_alone_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cost, "PROCESS", tmp_path / "nowhere")
-    taken = cost.start().stop()
+    taken = cost.Stopwatch().stop()
     assert taken.memory_mib is None
     assert taken.seconds >= 0
 
@@ -82,12 +82,12 @@ class Node:
 
 
 def test_what_a_solution_left_in_circles_is_let_go_before_the_next() -> None:
-    cost.start().stop()
+    cost.Stopwatch().stop()
     left = Node()
     left.own = left
     seen = weakref.ref(left)
     del left
-    cost.start().stop()
+    cost.Stopwatch().stop()
     assert seen() is None
 
 

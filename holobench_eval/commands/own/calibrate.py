@@ -59,17 +59,15 @@ def _family(name: str, draws: int, folder: Path, workers: int | None) -> None:
     from ...study.calibration.family import compute, load_family
     from ...study.calibration.posterior import members, middle, write_member
     from ...study.executors import executor
-    from ...study.running.progress import SECONDS_BETWEEN_LINES, duration
+    from ...study.running.progress import duration, seldom
     from ..output import console
 
-    family, screen, began, last = load_family(name), console(), time.monotonic(), 0.0
+    family, screen, began, is_due = load_family(name), console(), time.monotonic(), seldom()
 
     def tell(done: int, of: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if done == of or now - last > SECONDS_BETWEEN_LINES:
-            last = now
-            screen.print(f"{done} of {of} draws, about {duration((of - done) * (now - began) / done)} left")
+        if is_due() or done == of:
+            left = duration((of - done) * (time.monotonic() - began) / done)
+            screen.print(f"{done} of {of} draws, about {left} left")
 
     rows = compute(name, folder, executor("auto", workers), draws, tell)
     kept = members(family, name, rows, folder)

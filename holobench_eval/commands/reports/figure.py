@@ -25,9 +25,9 @@ def figure(
     from ...report.description import describe
     from ...report.section import Report
 
-    found = load(config, output)
-    layout = layout_of(found.study)
-    results = Results(records_frame(found.records, layout), layout, related(layout, found.folder.parent))
-    report = Report(results, found.records, found.folder, found.known, describe(found.study))
+    study, records, folder, known, _ = load(config, output)
+    layout = layout_of(study)
+    results = Results(records_frame(records, layout), layout, related(layout, folder.parent))
+    report = Report(results, records, folder, known, describe(study))
     for path in print_figures(report, into, medium):
         print(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,28 +16,18 @@ if TYPE_CHECKING:
     from ...study.plan import Plan
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """A study with its records, a record for every planned cell, the folder of its report, and its provenance.
-
-    raw: whether the records are those of a run, with pictures, and not a committed records.csv.
-    """
-
-    study: Study
-    records: list[dict[str, Any]]
-    folder: Path
-    known: dict[str, Any]
-    raw: bool
-
-
 def report(config: Config, output: Output = None) -> None:
     """Write the report of a study again: from its records, or from a committed records.csv."""
-    found = load(config, output)
-    write_report(console(), found.study, found.records, found.folder, found.known, keep_pictures=not found.raw)
+    study, records, folder, known, is_raw = load(config, output)
+    write_report(console(), study, records, folder, known, keep_pictures=not is_raw)
 
 
-def load(config: Path, output: Path | None) -> Loaded:
-    """Load what a report is written from. UserError: there are no records, or of another study or code."""
+def load(config: Path, output: Path | None) -> tuple[Study, list[dict[str, Any]], Path, dict[str, Any], bool]:
+    """Load what a report is written from: a study, a record for every planned cell, the folder of its report, its
+    provenance, and whether the records are those of a run, with pictures, and not a committed records.csv.
+
+    UserError: there are no records, or of another study or code.
+    """
     from ...study.running import provenance
     from ...study.store import Store
 
@@ -59,7 +48,7 @@ def load(config: Path, output: Path | None) -> Loaded:
             f"holoeval rescore {typed} --output {shlex.quote(str(folder))} makes it from the kept captures"
         )
     known = provenance.read(folder) if missing else provenance.restate(folder, study, grid, as_scored=not raw)
-    return Loaded(study, records, folder, known, raw)
+    return study, records, folder, known, raw
 
 
 def _committed(grid: Plan, path: Path, again: str) -> list[dict[str, Any]]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -96,16 +97,19 @@ def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, wh
 
     records, plan = read_run(report).records, plan_cells(study)
     rows, verdict = _by_key(records), Verdict()
-    cells = [(task, cell, _key(task, cell)) for task in plan.tasks for cell in task.cells]
-    for number, what in (
-        (len(rows.keys() - {key for *_, key in cells}), "that the config does not plan"),
-        (int((records["state"] != DONE).sum()), "without a score"),
-    ):
+    tasks = [task for task in plan.tasks for _ in task.cells]
+    keys = [(label, cell.condition, cell.target, cell.repeat) for label, cell in plan.labelled()]
+    lacking, unscored = len(rows.keys() - {*keys}), int((records["state"] != DONE).sum())
+    for number, what in ((lacking, "that the config does not plan"), (unscored, "without a score")):
         if number:
             verdict.notes.append(f"not rerun: {number} row{'s' * (number > 1)} of records.csv {what}")
-    scored = [Planned(*each, rows[each[2]]) for each in cells if each[2] in rows and rows[each[2]]["state"] == DONE]
+    cells = [Planned(*each, rows[each[2]]) for each in zip(tasks, plan.cells, keys, strict=True) if each[2] in rows]
+    scored = [each for each in cells if each.row["state"] == DONE]
     obstacles = _obstacles(study, plan, scored, artifacts)
-    verdict.notes += _notes(scored, obstacles)
+    for why in dict.fromkeys(obstacles.values()):
+        labels = [each.task.label for each in scored if obstacles.get(each.cell.id) == why]
+        count_of = f"{len(labels)} cell{'s' * (len(labels) > 1)}"
+        verdict.notes.append(f"not rerun: {listed(dict.fromkeys(labels))} ({count_of}): {why}")
     chosen = sample([each for each in scored if each.cell.id not in obstacles], count, seed)
     if chosen:
         verdict.cells = len(chosen)
@@ -137,21 +141,17 @@ def sample(cells: Sequence[Planned], count: int, seed: int) -> list[Planned]:
     return chosen
 
 
-def _key(task: Task, cell: Cell) -> Key:
-    return (cell.method if task.is_floor else task.label), cell.condition, cell.target, cell.repeat
-
-
-def _by_key(records: pd.DataFrame) -> dict[Key, dict[Any, Any]]:
+def _by_key(records: pd.DataFrame) -> dict[Any, dict[Any, Any]]:
     from ...report.compare.paired import CELL
 
-    rows = records.to_dict("records")
-    return {(row[CELL[0]], row[CELL[1]], row[CELL[2]], row[CELL[3]]): row for row in rows}
+    return records.set_index(list(CELL), drop=False).to_dict("index")
 
 
 def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Path) -> dict[str, str]:
     """Why cells cannot be computed again, by their ids; nothing for those that can."""
     from ...study.artifacts import Artifacts
-    from ...study.running.run import refuse_unscored
+    from ...study.plan import Plan
+    from ...study.running.run import refuse_unavailable, refuse_unscored
 
     if study.display.real:
         return {each.cell.id: "photographs of a real display" for each in cells}
@@ -159,43 +159,28 @@ def _obstacles(study: Study, plan: Plan, cells: Sequence[Planned], artifacts: Pa
         refuse_unscored(study)
     except UserError as error:
         return {each.cell.id: str(error) for each in cells}
-    store = Artifacts(artifacts)
+    tasks, store = {each.task.label: each.task for each in reversed(cells)}, Artifacts(artifacts)
     untrained = {name for name, training in plan.preparations().items() if not store.has(training)}
-    unavailable: dict[str, str] = {}
+
+    @cache
+    def unavailable(label: str) -> str:
+        task = tasks[label]
+        try:
+            refuse_unavailable(Plan((task,)), frozenset((task.cells[0].id,)), study.folder)
+        except UserError as error:
+            return str(error)
+        return ""
 
     def reason(each: Planned) -> str:
         if each.cell.starts:
             return "starts from the phases of all other methods, which records.csv has not"
-        if not untrained.isdisjoint(each.cell.prepared):
-            seconds = float(each.row.get("training_s", 0))
-            length = f"about {max(1, round(seconds / 60))} min" if 0 < seconds < math.inf else "unknown length"
-            return f"needs training of {length}, and {artifacts} has no artifact of it"
-        if each.task.label not in unavailable:
-            unavailable[each.task.label] = _unavailable(each, study)
-        return unavailable[each.task.label]
+        if untrained.isdisjoint(each.cell.prepared):
+            return unavailable(each.task.label)
+        seconds = float(each.row.get("training_s", 0))
+        length = f"about {max(1, round(seconds / 60))} min" if 0 < seconds < math.inf else "unknown length"
+        return f"needs training of {length}, and {artifacts} has no artifact of it"
 
-    reasons = {each.cell.id: reason(each) for each in cells}
-    return {name: why for name, why in reasons.items() if why}
-
-
-def _unavailable(each: Planned, study: Study) -> str:
-    """Why a cell's method cannot run here; empty if it can."""
-    from ...study.plan import Plan
-    from ...study.running.run import refuse_unavailable
-
-    try:
-        refuse_unavailable(Plan((each.task,)), frozenset((each.cell.id,)), study.folder)
-    except UserError as error:
-        return str(error)
-    return ""
-
-
-def _notes(cells: Sequence[Planned], obstacles: Mapping[str, str]) -> Iterator[str]:
-    """A line for every reason, with the methods that it holds for."""
-    for why in dict.fromkeys(obstacles.values()):
-        kept = [each for each in cells if obstacles.get(each.cell.id) == why]
-        labels = listed(dict.fromkeys(each.task.label for each in kept))
-        yield f"not rerun: {labels} ({len(kept)} cell{'s' * (len(kept) > 1)}): {why}"
+    return {each.cell.id: why for each in cells if (why := reason(each))}
 
 
 def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: Executor) -> dict[Key, dict[Any, Any]]:
@@ -229,7 +214,8 @@ def _judge(
 ) -> None:
     """Count the numbers of the chosen cells that are reproduced, and note the others."""
     from ...metrics.protocol import VERSION as PROTOCOL
-    from ...report.data.tables import DONE
+    from ...report.data.scores import parse
+    from ...report.data.tables import DONE, rounded
 
     others = sum(each.cell.id != each.row["cell"] for each in chosen)
     if others:
@@ -254,23 +240,14 @@ def _judge(
         if learned[0] != learned[1]:
             was, now = (sha256[:12] or "nothing" for sha256 in learned)
             verdict.faults.append(f"{each}: learned state was {was}, is {now}: another artifact")
-        for name in scores:
-            if name not in lacking and not name.startswith(MATCHES):
-                _judge_number(each, name, row, verdict)
-
-
-def _judge_number(each: Planned, name: str, row: Mapping[Any, Any], verdict: Verdict) -> None:
-    from ...report.data.scores import parse
-    from ...report.data.tables import rounded
-
-    score = parse(name)
-    then, now = float(each.row[name]), float(row.get(name, math.nan))
-    if math.isnan(then) or (each.cell.method in FLAT and score.metric in OF_EDGES):
-        return
-    if rounded(then) == rounded(now):
-        verdict.reproduced += 1
-    elif abs(then - now) <= (TOLERANCE_DB if score.unit == "dB" else TOLERANCE):
-        verdict.close += 1
-    else:
-        found = "missing" if math.isnan(now) else f"{now:.6g}"
-        verdict.faults.append(f"{each}: {score.key}{score.brackets} was {then:.6g}, is {found}")
+        for name in (name for name in scores if name not in lacking and not name.startswith(MATCHES)):
+            score, number, found = parse(name), float(each.row[name]), float(row.get(name, math.nan))
+            if math.isnan(number) or (each.cell.method in FLAT and score.metric in OF_EDGES):
+                continue
+            if rounded(number) == rounded(found):
+                verdict.reproduced += 1
+            elif abs(number - found) <= (TOLERANCE_DB if score.unit == "dB" else TOLERANCE):
+                verdict.close += 1
+            else:
+                told = "missing" if math.isnan(found) else f"{found:.6g}"
+                verdict.faults.append(f"{each}: {score.key}{score.brackets} was {number:.6g}, is {told}")

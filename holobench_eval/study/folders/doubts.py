@@ -34,7 +34,8 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
         bright.sort(key=lambda record: -record.values()["darkest"])
         shares = named([f"{_name(record)} {record.values()['darkest']:.0%}" for record in bright])
         first = folders.captures[bright[0].label, bright[0].target]
-        remedy = "" if first.dark else f" If the files still have one, {_remedy(bright[0])}."
+        linear = "" if bright[0].capture["values"] == "linear" else "save linear counts and "
+        remedy = "" if first.dark else f" If the files still have one, {linear}take it off with --dark FILE|LEVEL."
         yield (
             f"Bright where the target is darkest, by more than {LIFTED:.0%} of its white{_although(first)}: "
             f"{shares}. Haze and stray light of the display do that; so does a camera's black level, which can turn "
@@ -58,12 +59,6 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
     if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
-
-
-def _remedy(record: Record) -> str:
-    """How a black level is taken off the files of a capture."""
-    linear = record.capture["values"] == "linear"
-    return f"{'' if linear else 'save linear counts and '}take it off with --dark FILE|LEVEL"
 
 
 def _although(picture: Picture) -> str:

@@ -167,20 +167,18 @@ def remedies(holes: Iterable[Hole]) -> str:
     kinds = defaultdict[str, list[tuple[str, str]]](list)
     for state, method, target, reason in holes:
         kinds[_kind(state, reason)].append((method, target))
-    found = "; ".join(_by_kind(kinds))
+    at_target = list(dict.fromkeys(target for _, target in kinds["target"]))
+    in_file = [f"{method}/{target}" for method, target in kinds["file"]]
+    plural = "s" * (len(at_target) > 1)
+    ways = {
+        f"save or choose the target{plural} {named(at_target)} anew, whose fault it is and not the captures', as the "
+        "reasons say": at_target,
+        f"save {named(in_file)} anew, as the reasons say": in_file,
+        "take the failed captures again, or name them by what they show": kinds["photograph"],
+        "add the captures that are missing": kinds["missing"],
+    }
+    found = "; ".join(way for way, whose in ways.items() if whose)
     return f"{found[:1].upper()}{found[1:]}." if found else ""
-
-
-def _by_kind(kinds: defaultdict[str, list[tuple[str, str]]]) -> Iterator[str]:
-    if at_target := list(dict.fromkeys(target for _, target in kinds["target"])):
-        which = f"target{'s' * (len(at_target) > 1)} {named(at_target)}"
-        yield f"save or choose the {which} anew, whose fault it is and not the captures', as the reasons say"
-    if in_file := [f"{method}/{target}" for method, target in kinds["file"]]:
-        yield f"save {named(in_file)} anew, as the reasons say"
-    if kinds["photograph"]:
-        yield "take the failed captures again, or name them by what they show"
-    if kinds["missing"]:
-        yield "add the captures that are missing"
 
 
 def _kind(state: str, reason: str) -> str:

@@ -75,24 +75,23 @@ def export(
     shown = next(iter(displays(chosen).values()))
     if shown.spec.bits != 8:
         raise UserError(f"'{shown.name}' has {shown.spec.bits} bits; patterns are written with 8")
-    described_bench = load_bench_file(shown.real.bench) if shown.real and shown.real.bench else None
+    file = shown.real.bench if shown.real else None
+    described_bench = load_bench_file(file) if file else None
     if dark is None and described_bench:
         dark = described_bench.capture.dark
     if dark is not None:
         given_dark(dark)  # what is wrong with it is said before the folder is made
     inside = BENCH if bench else study.display.bench
-    beside = _beside(described_bench, shown.real.bench, inside) if described_bench and shown.real else {}
+    copies = _beside(described_bench, file, inside) if described_bench and file else {}
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / STUDY, chosen.text.encode())
     if inside and _stays_inside(inside):
-        copy = folder / inside
-        if copy.exists():
+        if (folder / inside).exists():
             raise UserError(f"{inside}: a session has a file of this name of its own; rename the bench file")
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(bench or study.folder / inside, copy)
-    for place, file in beside.items():
+        copies = {Path(inside): bench or study.folder / inside, **copies}
+    for place, original in copies.items():
         (folder / place).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, folder / place)
+        shutil.copyfile(original, folder / place)
     phase = described_bench.phase if described_bench else Convention()
     if phase.correction is not None:
         map_file = (Path(inside or BENCH).parent / phase.correction.file).as_posix()
@@ -117,13 +116,11 @@ def export(
     return _advance(opened, folder, watch)
 
 
-def _beside(bench: BenchFile, file: Path | None, copied: str | None) -> dict[Path, Path]:
+def _beside(bench: BenchFile, file: Path, copied: str | None) -> dict[Path, Path]:
     """The files that a bench file names, by their places in a session, where the bench file's copy finds them.
 
     copied: place of that copy. UserError for a file that does not lie in the bench file's folder.
     """
-    if file is None:
-        return {}
     named = {} if bench.phase.correction is None else {"phase.correction.file": Path(bench.phase.correction.file)}
     if isinstance(bench.capture.dark, str) and copied and _stays_inside(copied):  # else it is read where it is
         named["capture.dark"] = Path(os.path.relpath(bench.capture.dark, file.resolve().parent))
@@ -281,16 +278,12 @@ def _advance(study: Study, folder: Path, watch: Lines) -> Advance:
     _bench(study).announce_grid()
     photographer = session_photographer(folder)
     outcome = run(study, plan(study), folder / REPORT, Serial(), watch, 1, folder / ARTIFACTS, retry_failed=True)
-    if photographer.wanted and photographer.manifest.rounds and not _takes_rounds(study):
+    methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
+    takes_rounds = "matched" in {entry.exposure for entry in study.methods}  # or a hologram depends on photographs
+    takes_rounds |= any(method.trains or method.camera or method.follows for method in methods)
+    if photographer.wanted and photographer.manifest.rounds and not takes_rounds:
         fault = f"other holograms are computed here than were photographed, and {REPORT}/solved lacks those"
         remedy = "bring the whole folder of the session from where it was exported, or import it there"
         raise UserError(f"{folder}: {fault}; {remedy}")
     patterns = photographer.write_round() if photographer.wanted else []
     return Advance(study, tuple(patterns), outcome)
-
-
-def _takes_rounds(study: Study) -> bool:
-    """Whether a hologram of the study may depend on photographs of others."""
-    methods = [isolation.traits(entry.name, study.folder) for entry in study.methods]
-    matched = any(entry.exposure == "matched" for entry in study.methods)
-    return matched or any(method.trains or method.camera or method.follows for method in methods)

@@ -5,7 +5,7 @@ The harness gets what such a method declares, asks it to solve, and answers what
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial, partialmethod
@@ -17,16 +17,17 @@ import torch
 from ...core import parameters, plugins, sources
 from ...core.device import CPU
 from ...core.errors import CellError, UserError
-from ...core.hashing import canonical
+from ...core.hashing import ABSENT, canonical, file_digest
+from ...core.io import file_name
 from ...core.reads import Seen, recorded
 from ...core.schema import FieldError
 from ...display.traits import BOOLEANS, FLAGS, Traits, traits_of
-from ..definition import Isolation, Limits
+from ..definition import Isolation, Limits, MethodEntry
 from ..versions import AGAIN, method_version
 from . import process
 from .reads import Reads as Reads
 from .reads import changed as changed
-from .reads import reads_of
+from .reads import named_files, reads_of
 
 
 class Apart:
@@ -65,11 +66,7 @@ class Opened:
     @property
     def reads(self) -> Reads:
         """What a user's code has read so far; nothing for a method of this package, which declares it."""
-        cls = type(self.method)
-        if sources.ships(cls):
-            return Reads({}, ())
-        code = sources.code_of(cls)
-        return reads_of(self.seen.of_the_method(code.folder), params_of(self.method), code)
+        return reads_of(self.method, params_of, self.seen)
 
 
 @contextmanager
@@ -176,3 +173,54 @@ def runs_inside(name: str, folder: Path, isolation: Isolation) -> bool:
         return plugins.is_shipped("methods", name)
     declared = traits(name, folder)
     return isolation == "none" or declared.privileged or declared.simulates
+
+
+def files_read(entry: MethodEntry, folder: Path, targets: Collection[str]) -> dict[str, dict[str, str]]:
+    """What ``digests`` gives for every target of a method of a study. folder: of the config.
+
+    UserError where not one of the files is there, and where the method refuses that targets share a file; a few that
+    lack are holes of the table.
+    """
+    method = build(entry.name, entry.params, folder)
+    try:
+        found = {target: _files(method, target) for target in targets}
+        taken = external(method) | _named(method)
+        if hasattr(method, "refuse_shared"):
+            method.refuse_shared([*targets])
+    except (CellError, OSError) as error:
+        raise UserError(f"method '{entry.name}' does not say which files it reads: {error}") from error
+    except UserError as error:
+        raise UserError(f"method '{entry.name}': {error}") from None
+    read = [(target, path, sha256) for target, digests in found.items() for path, sha256 in digests.items()]
+    if read and all(sha256 == ABSENT for *_, sha256 in read):
+        target, path, _ = read[0]
+        path += "" if file_name(target) == target else f" for the target '{target}'"
+        where = "" if Path(path).is_absolute() else ", from the working directory"
+        raise UserError(f"method '{entry.name}': none of the files that it reads is there, such as {path}{where}")
+    return {target: {**digests, **taken} for target, digests in found.items()}
+
+
+def digests(method: Any, target: str) -> dict[str, str]:
+    """All files that a method's phase of a target is known to depend on, beside its code: ``files``, ``external`` and,
+    of a user's method, those that parameters name. What a method of this package reads, it declares by these functions:
+    a file that is replaced gives another phase."""
+    return {**_files(method, target), **external(method), **_named(method)}
+
+
+def _named(method: Any) -> dict[str, str]:
+    cls = type(method)
+    return {} if sources.ships(cls) else named_files(params_of(method), sources.code_of(cls))
+
+
+def _files(method: Any, target: str) -> dict[str, str]:
+    """sha256 of the files that a method reads for a target, by the paths that its function ``files`` gives; ``absent``
+    for one that is not there. Empty for a method without that function."""
+    given = method.files(target) if "files" in traits_of(method).functions else ()
+    return {str(path): file_digest(str(path)) for path in given}
+
+
+def external(method: Any) -> dict[str, str]:
+    """sha256 of the files that a method takes where a machine has them, by names that are the same everywhere;
+    ``absent`` for one that is not there. Its function ``external`` gives their paths, None for no file."""
+    given = method.external() if "external" in traits_of(method).functions else {}
+    return {name: ABSENT if path is None else file_digest(path) for name, path in given.items()}

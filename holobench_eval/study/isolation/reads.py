@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ...core.hashing import ABSENT, file_digest, file_state
-from ...core.plugins import params_of
 from ...core.reads import STARTED, Seen, within
 from ...core.sources import Code, code_of, lies_in, ships
 
@@ -30,12 +29,16 @@ class Reads:
     uncovered: tuple[str, ...]
 
 
-def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
-    """What was read, told apart: covered is what lies below the folder of the study or of the method's file, and what
-    a parameter names, itself or by a folder above it.
+def reads_of(plugin: Any, params_of: Callable[[Any], Any], opened: Seen) -> Reads:
+    """What a user's method or dataset has read, told apart: covered is what lies below the folder of the study or of
+    its file, and what a parameter names, itself or by a folder above it; files of its own code count there.
 
-    params: of the method; code: its own, whose files count there.
+    Nothing for one of this package, which declares what it reads, or has a digest for each image.
     """
+    if ships(type(plugin)):
+        return Reads({}, ())
+    code, params = code_of(type(plugin)), params_of(plugin)
+    seen = opened.of_the_method(code.folder)
     study = Path(code.study).absolute()
     folder, named = str(study), [path for paths in _places(params, study).values() for path in paths]
     places, own = [folder, code.folder, *named], dict(zip(code.paths, code.files.values(), strict=True))
@@ -52,14 +55,6 @@ def reads_of(seen: Seen, params: Any, code: Code) -> Reads:
         name = os.path.relpath(path, folder) if within(path, folder) else path
         covered[name] = ABSENT if state is None else file_digest(path) if file_state(path) == state else CHANGED
     return Reads(dict(sorted(covered.items())), tuple(sorted(uncovered)))
-
-
-def reads_of_dataset(dataset: Any, seen: Seen) -> Reads:
-    """What a user's dataset has read for its images; nothing for one of this package, which has a digest for each."""
-    if ships(type(dataset)):
-        return Reads({}, ())
-    code = code_of(type(dataset))
-    return reads_of(seen.of_the_method(code.folder), params_of(dataset), code)
 
 
 def changed(covered: Mapping[str, str], folder: Path) -> str:

@@ -75,6 +75,19 @@ class Follower:
                     tell(line)
 
 
+def seldom(clock: Callable[[], float] = time.monotonic) -> Callable[[], bool]:
+    """What says whether the next line may be written: one every few seconds."""
+    last = clock()
+
+    def is_due() -> bool:
+        nonlocal last
+        if is_late := clock() - last >= SECONDS_BETWEEN_LINES:
+            last = clock()
+        return is_late
+
+    return is_due
+
+
 @dataclass
 class Lines:
     """Sees a run's progress, and writes plain lines: at most one every few seconds, and one for every failure.
@@ -88,10 +101,9 @@ class Lines:
     done: int = 0
     failures: int = 0
     follower: Follower = field(default_factory=lambda: Follower(15.0))
-    last: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.last = self.clock()
+        self.is_due = seldom(self.clock)
         self.expects(lambda: None)
 
     def planned(self, cells: int, missing: int, floors: int) -> None:
@@ -123,9 +135,7 @@ class Lines:
 
     def started(self, task: Task) -> None:
         """A task is taken up."""
-        now = self.clock()
-        if now - self.last >= SECONDS_BETWEEN_LINES:
-            self.last = now
+        if self.is_due():
             training = len(self.follower.folders)
             left = f", {self.time_left} left" if self.time_left else ""
             left += f" besides the {training} in training" * bool(left and training)

@@ -71,18 +71,17 @@ def software() -> dict[str, Any]:
 
 def revision() -> dict[str, Any]:
     """The git revision of the package and whether its files were changed since; nothing outside a checkout."""
-    folder = Path(__file__).parent
     try:
-        _git(folder, "ls-files", "--error-unmatch", Path(__file__).name)
-        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
-        return {"revision": _git(folder, "rev-parse", "HEAD"), "dirty": bool(changed)}
+        _git("ls-files", "--error-unmatch", Path(__file__).name)
+        changed = _git("status", "--porcelain", "--untracked-files=no")
+        return {"revision": _git("rev-parse", "HEAD"), "dirty": bool(changed)}
     except (OSError, subprocess.SubprocessError):
         return {"revision": None, "dirty": None}
 
 
-def _git(folder: Path, *arguments: str) -> str:
+def _git(*arguments: str) -> str:
     command = ["git", "--no-optional-locks", *arguments]  # a killed run would leave its lock in the user's repository
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=20, check=True)
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=20, check=True)
     return done.stdout.strip()
 
 

@@ -53,7 +53,7 @@ class Queue:
         yield from self._trainings
         alone, groups = list[Job](), dict[tuple[str, frozenset[str]], deque[Step]]()
         late = set[str]()  # cells of jobs that run alone
-        for job in sorted(self._jobs, key=_follows):
+        for job in sorted(self._jobs, key=lambda job: any(cell.starts for cell, _ in job.cells)):
             if job.alone or not late.isdisjoint(_needs(job)):
                 alone.append(job)
                 late |= job.wanted
@@ -84,7 +84,3 @@ class Queue:
 
 def _needs(job: Job) -> frozenset[str]:
     return frozenset(identity for cell, _ in job.cells for identity in (*cell.prepared, *cell.starts))
-
-
-def _follows(job: Job) -> bool:
-    return any(cell.starts for cell, _ in job.cells)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from ...core.errors import reason as one_line
 from ...core.hashing import canonical, digest
 from ...display.traits import traits_of
 from ...metrics import catalogue
-from .. import cost, isolation
+from .. import cost, identity, isolation
 from ..artifacts import Artifacts
 from ..definition import Study
 from ..displays import Preparation
@@ -114,51 +114,27 @@ def run(
     store, learned = Store(output), Artifacts(artifacts)
     with store.locked():
         if retrain:
-            refuse_unscored(study)
-            refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
-            forget(plan, store, phases_of(output, study.folder), learned)
+            forget(study, plan, store, learned)
         metrics = {name: plan.metrics[name] for name in rescore or plan.metrics}
         left = _left(study, plan, store, learned, metrics, retry_failed, solves=not rescore)
-        if left.wanted:
-            refuse_unscored(study)
-        refuse_unavailable(plan, left.missing, study.folder)
-        if not trains:
-            refuse_untrained(plan, left.missing, learned)
+        _refuse(study, plan, left, learned, trains)
         store.remove(left.outdated)  # at once, so that a run that is killed does not take them for new
         watch.planned(len(plan.cells), len(left.wanted), plan.floors)
-        setting = _setting(study, output, artifacts, metrics, threads, executor.workers, device)
-        described = _begun(study, plan, left, setting, executor)
+        setting = Setting(replace(study), output, artifacts, metrics, threads, executor.workers, device)
+        described = _begun(setting, plan, left, executor)
         # With nothing to do no worker need be started.
         solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
             described = provenance.end(output, described)
-        states = store.states(tuple(left.unscored.values()), metrics=metrics, folder=study.folder)
-        rescored = sum(state != "unscored" for state in states.values())
-        return Outcome(store.load(plan), described, len(left.missing), solved, rescored, len(states) - rescored)
+        again = filter(None, map(store.read, left.unscored))
+        unscored = sum(bool(identity.lacking(record.scores, metrics)) for record in again)
+        rescored = len(left.unscored) - unscored
+        return Outcome(store.load(plan), described, len(left.missing), solved, rescored, unscored)
 
 
-def _setting(
-    study: Study, output: Path, artifacts: Path, metrics: Mapping[str, str], threads: int, workers: int, device: str
-) -> Setting:
-    """What every worker is told of the run."""
-    return Setting(
-        output=output,
-        folder=study.folder,
-        artifacts=artifacts,
-        save=study.save,
-        metrics=metrics,
-        lpips_weights=study.protocol.lpips_weights,
-        threads=threads,
-        workers=workers,
-        device=device,
-        isolation=study.isolation,
-        limits=study.limits,
-    )
-
-
-def _begun(study: Study, plan: Plan, left: _Left, setting: Setting, executor: Executor) -> dict[str, Any]:
+def _begun(setting: Setting, plan: Plan, left: _Left, executor: Executor) -> dict[str, Any]:
     """The provenance, written as a run begins that computes something or has another config; else that from before."""
-    output, described = setting.output, provenance.read(setting.output)
+    study, output, described = setting.study, setting.output, provenance.read(setting.output)
     if left.missing or described.get("config_sha256") != provenance.text_digest(study.text):
         is_here = isinstance(executor, Serial | Local)  # else the GPU is another machine's
         gpu = gpu_name(find(setting.device)) if is_here else ""
@@ -271,18 +247,24 @@ def _announced(plan: Plan, left: _Left, artifacts: Artifacts, watch: Lines) -> l
     return untrained
 
 
-def forget(plan: Plan, store: Store, phases: Phases, artifacts: Artifacts) -> None:
-    """Remove what was learned for a plan, and the phases and records that depend on it."""
+def forget(study: Study, plan: Plan, store: Store, artifacts: Artifacts) -> None:
+    """Remove what was learned for a plan, and the phases and records that depend on it; not where all of it could not
+    be computed again."""
+    refuse_unscored(study)
+    refuse_unavailable(plan, frozenset(cell.id for cell in plan.cells), study.folder)
     for preparation in plan.preparations().values():
         artifacts.remove(preparation)
     learned = [cell for cell in plan.cells if cell.prepared]
-    phases.remove(cell.phase_id for cell in learned)
+    phases_of(store.output, study.folder).remove(cell.phase_id for cell in learned)
     store.remove(cell.id for cell in learned)
 
 
-def refuse_untrained(plan: Plan, missing: frozenset[str], artifacts: Artifacts) -> None:
-    """UserError, in one line, if a missing cell needs something that is not trained."""
-    for preparation in _untrained(plan, missing, artifacts):
+def _refuse(study: Study, plan: Plan, left: _Left, artifacts: Artifacts, trains: bool) -> None:
+    """UserError, in one line, where what is left cannot be computed here, or would be trained and may not be."""
+    if left.wanted:
+        refuse_unscored(study)
+    refuse_unavailable(plan, left.missing, study.folder)
+    for preparation in [] if trains else _untrained(plan, left.missing, artifacts):
         reason = artifacts.outdated(preparation) or f"{artifacts.folder} has nothing that it has learned"
         raise UserError(f"--no-train: {preparation.method} on {preparation.display.name} would be trained: {reason}")
 

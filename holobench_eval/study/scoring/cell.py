@@ -78,7 +78,7 @@ def _measured(job: Job) -> Measured:
     solving, floor = MEASURES[first.measure]
     if job.task.is_floor:
         return floor(job)
-    with guarded(first.method, job.setting.isolation, job.task.conditions[0], first.seed):
+    with guarded(first.method, job.setting.study, job.task.conditions[0]):
         return solving(job)
 
 

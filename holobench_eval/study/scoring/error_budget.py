@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from torch import Tensor
+
 from ...display.api import ideal_image
 from ...metrics import error_budget as budget
 from .job import Job, Measured
 from .picture import refuse_saturated
-from .prediction import AGAIN, Foreseen, ask, compared, further, shown
+from .prediction import AGAIN, ask, further, prediction, shown
 
 
 def error_budget(job: Job) -> Measured:
@@ -15,16 +17,16 @@ def error_budget(job: Job) -> Measured:
     cell, display = job.task.cells[0], job.task.conditions[0]
     ask(job, cell, display, dict.fromkeys(("", AGAIN, *further(job))))
 
-    def scores(seen: Foreseen) -> dict[str, float]:
+    def scores(phase: Tensor, target: Tensor, capture: Tensor, predicted: Tensor) -> dict[str, float]:
         _, again = shown(job, cell, display, AGAIN)
         refuse_saturated(again)
-        ideal, capture = ideal_image(seen.hologram.phase, display.spec), seen.capture.image
+        ideal = ideal_image(phase, display.spec)
         return {
-            budget.TARGET: budget.unexplained(capture, seen.target, seen.target),
-            budget.IDEAL: budget.unexplained(capture, ideal, seen.target),
-            budget.PREDICTION: budget.unexplained(capture, seen.prediction, seen.target),
-            budget.NOISE: budget.temporal(capture, again.image, seen.target),
-            budget.ALGORITHM: budget.unexplained(ideal, seen.target, seen.target),
+            budget.TARGET: budget.unexplained(capture, target, target),
+            budget.IDEAL: budget.unexplained(capture, ideal, target),
+            budget.PREDICTION: budget.unexplained(capture, predicted, target),
+            budget.NOISE: budget.temporal(capture, again.image, target),
+            budget.ALGORITHM: budget.unexplained(ideal, target, target),
         }
 
-    return compared(job, scores)
+    return prediction(job, scores)

@@ -38,7 +38,7 @@ def views(job: Job) -> Measured:
     """Solve for the views of a scene that methods are given, or for the first of them; the result shows the phase to a
     pupil at any of the task's places and on its displays."""
     own, display = job.task.cells[0], job.task.conditions[0].nominal
-    dataset = plugins.build("datasets", own.dataset, dict(own.dataset_params), job.setting.folder)
+    dataset = plugins.build("datasets", own.dataset, dict(own.dataset_params), job.setting.study.folder)
     given = given_views(dataset, own.target)
     cells = tuple(replace(own, target=name, target_sha256=sha256) for name, sha256, _ in given)
     solving = replace(job, task=replace(job.task, cells=cells, conditions=(display,) * len(cells)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,10 @@ from ...core.hashing import canonical
 from ...core.reads import Seen, recorded
 from ...display.learned import LearnedBench
 from .. import cost, isolation, opening
-from ..artifacts import Artifact, Artifacts
-from ..definition import Isolation, Limits, Save
+from ..artifacts import FAILURE, Artifact, Artifacts
+from ..definition import Study
 from ..displays import Condition, Preparation
-from ..isolation.reads import Reads, reads_of_dataset
+from ..isolation.reads import Reads, reads_of
 from ..phases import Phases, phases_of
 from ..plan import Cell, Task
 from ..store import Record, State, Store
@@ -43,23 +43,18 @@ Measure = Callable[["Job"], Measured]  # does the work that all cells of a job s
 class Setting:
     """The settings of a run that a worker needs besides its task.
 
-    output: the study's output folder; folder: the config's folder, where relative paths start; artifacts: folder of
+    study: without what it has opened, since it goes to other processes; output: its output folder; artifacts: folder of
     what trained methods learned; metrics: versions of those to compute, by name; threads: torch threads of a worker;
-    workers: tasks computed side by side; device: name of where a worker computes, see ``device.find``; isolation,
-    limits: see ``definition.Study``.
+    workers: tasks computed side by side; device: name of where a worker computes, see ``device.find``.
     """
 
+    study: Study
     output: Path
-    folder: Path
     artifacts: Path
-    save: Save
     metrics: Mapping[str, str]
-    lpips_weights: str | None
     threads: int
     workers: int
-    device: str = "cpu"
-    isolation: Isolation = "files"
-    limits: Limits = field(default_factory=Limits)
+    device: str
 
 
 @dataclass(frozen=True)
@@ -90,7 +85,7 @@ class Job:
     @property
     def phases(self) -> Phases:
         """Where phases are kept."""
-        return phases_of(self.setting.output, self.setting.folder)
+        return phases_of(self.setting.output, self.setting.study.folder)
 
     @property
     def kind(self) -> tuple[str, str]:
@@ -103,7 +98,8 @@ class Job:
     def timing(self) -> str:
         """The name of its timing; a job that ran alone is named as in a run with one worker."""
         workers = 1 if self.alone else max(2, self.setting.workers)  # one on a cluster may be joined by others
-        apart = not isolation.runs_inside(self.task.cells[0].method, self.setting.folder, self.setting.isolation)
+        study = self.setting.study
+        apart = not isolation.runs_inside(self.task.cells[0].method, study.folder, study.isolation)
         return cost.key(self.task, self.setting.threads, workers, gpu_name(self.device), apart)
 
     @property
@@ -126,7 +122,8 @@ class Job:
 
     def method(self, name: str, params: Any) -> Any:
         """An instance of a method, built anew: no cell may depend on those computed before."""
-        return isolation.solver(name, params, self.setting.folder, self.setting.isolation, self.setting.limits)
+        study = self.setting.study
+        return isolation.solver(name, params, study.folder, study.isolation, study.limits)
 
     def learned(self, preparation: Preparation | None) -> Artifact | None:
         """A method's learned state; None if it has nothing to learn. CellError when its training failed."""
@@ -134,7 +131,7 @@ class Job:
             return None
         artifacts = Artifacts(self.setting.artifacts)
         if not artifacts.has(preparation):
-            if preparation.display.real and not artifacts.has_failed(preparation):
+            if preparation.display.real and not (artifacts.folder_of(preparation) / FAILURE).is_file():
                 raise Pending("its training waits for photographs")
             raise CellError(f"not trained: {artifacts.failure(preparation)}")
         return artifacts.load(preparation)
@@ -152,7 +149,7 @@ class Job:
         """Where the target of a cell comes from."""
         params = canonical(dict(cell.dataset_params))
         code = cell.phase["target"].get("code", "")
-        return cell.dataset, code, params, self.setting.folder, cell.target, cell.target_sha256
+        return cell.dataset, code, params, self.setting.study.folder, cell.target, cell.target_sha256
 
     def target(self, cell: Cell, display: Condition) -> Tensor:
         """The target of a cell at the size of the scored region; see ``load_target``."""
@@ -192,4 +189,4 @@ def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> tupl
         target: Tensor = dataset.load(item, shape, channels=channels)
     if not target.any():
         raise CellError(f"target '{item}' is black; expected light in at least one of its colours")
-    return target, reads_of_dataset(dataset, seen)
+    return target, reads_of(dataset, plugins.params_of, seen)

@@ -53,7 +53,7 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
     keep_capture(job, cell, capture.image, lasting=display.real is not None)
-    timed = isolation.traits(cell.method, job.setting.folder).timed
+    timed = isolation.traits(cell.method, job.setting.study.folder).timed
     is_own = timed and plugins.is_shipped("methods", cell.method)  # none of those here has a doubtful phase
     looked_at = not is_own and cell.measure == "picture"  # else the phase is for other planes, too
     return job.record(
@@ -132,8 +132,8 @@ def keep_pictures(job: Job, cell: Cell, image: Tensor, wanted: Tensor, phase: Te
     setting = job.setting
     name = file_name(cell.target) + (f"-{cell.repeat}" if cell.repeat else "") + ".png"
     path = Path(file_name(job.task.label), file_name(cell.condition), name)
-    if setting.save.captures:
+    if setting.study.save.captures:
         write_capture(setting.output / "captures" / path, image)
-    if setting.save.phases:
+    if setting.study.save.phases:
         write_phase(setting.output / "phases" / path, phase)
     write_thumbnail(job.store.thumbnail(cell.id), match(image, wanted)[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Collection
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import torch
 from torch import Tensor
@@ -19,7 +19,6 @@ from .. import cost, isolation, opening
 from ..artifacts import Artifact
 from ..displays import Condition
 from ..isolation import Reads
-from ..isolation.read_files import digests
 from ..phases import Solution
 from ..plan import Cell
 from ..store import Record
@@ -31,48 +30,67 @@ from .scores import keep_capture, scores_of
 from .solution import solved_by, wrong_output
 
 PHOTOGRAPHS_KEPT = 64  # in a process: all methods predict the same ones
+More = Callable[[Tensor, Tensor, Tensor, Tensor], dict[str, float]]
+"""Scores of a hologram, its target ``(C, h, w)``, its capture, and the prediction of that, in the same unit."""
 AGAIN = "again"  # beside the changes of ``metrics.control``, another capture of the unchanged hologram
 
 
-def prediction(job: Job) -> Measured:
-    """Predict the capture of the hologram that the study shows for the task's target.
+def prediction(job: Job, more: More = lambda *_: {}) -> Measured:
+    """Predict the captures of the hologram that the study shows for the task's target, and of its changes where the
+    study asks for control.
 
     Capture and prediction get the factors that match the capture to the target, so that the capture is a picture in
     [0, 1]; the protocol's own match of the prediction follows.
+
+    more: gives further scores.
     """
-    return compared(job, lambda seen: {})
-
-
-@dataclass(frozen=True)
-class Foreseen:
-    """A hologram of a target ``(C, h, w)``, its capture, and the prediction of that ``(C, h, w)``, in the same unit;
-    the columns of control, where the study asks for it; what the prediction took, what was learned before, and what was
-    read."""
-
-    hologram: Solution
-    target: Tensor
-    capture: RectifiedCapture
-    prediction: Tensor
-    answers: dict[str, float]
-    taken: cost.Cost
-    learned: Artifact | None
-    reads: Reads
-
-
-def _foresee(job: Job) -> Foreseen:
-    """Predict the captures of the hologram of the task's target, and of its changes."""
-    task, cell, display = job.task, job.task.cells[0], job.task.conditions[0]
-    target = job.target(cell, display)
-    ask(job, cell, display, ("", *further(job)))
-    hologram, capture = shown(job, cell, display)
-    others = {variant: shown(job, cell, display, variant) for variant in further(job)}
-    method, learned = job.method(cell.method, cell.params), job.learned(task.preparation)
-    gate(method, cell.method, cell.code, digests(method, cell.target), cell.files)
+    own, shown_on = job.task.cells[0], job.task.conditions[0]
+    target = job.target(own, shown_on)
+    ask(job, own, shown_on, ("", *further(job)))
+    hologram, capture = shown(job, own, shown_on)
+    others = {variant: shown(job, own, shown_on, variant) for variant in further(job)}
+    learned = job.learned(job.task.preparation)
+    predict = _predictor(job, own, shown_on, target, learned)
     for photograph in (capture, *(other for _, other in others.values())):
         refuse_saturated(photograph)
+    predicted, taken, reads = predict(hologram.phase)
+    answers: dict[str, float] = {}
+    if others:
+        again = others.pop(AGAIN)[1].image
+        changed = {change: (other.image, predict(solved.phase)[0]) for change, (solved, other) in others.items()}
+        answers = control.control(capture.image, again, predicted, changed)
+    cost.keep(job.timing, taken.seconds)
+    wanted, factors = match(capture.image, target)
+    image, figures = factors.view(-1, 1, 1) * predicted, more(hologram.phase, target, capture.image, predicted)
+
+    def compare(cell: Cell, _: Condition) -> Record:
+        keep_pictures(job, cell, image, wanted, hologram.phase)
+        keep_capture(job, cell, image, wanted)
+        return job.record(
+            cell,
+            scores=scores_of(job, cell, image, wanted, job.setting.metrics, answers),
+            figures=figures,
+            alone=job.alone,
+            registration_residual_px=capture.residual,
+            saturated=capture.saturated,
+            learned=account(learned),
+            reads={**hologram.covered, **reads.covered},
+            uncovered=tuple({*hologram.uncovered, *reads.uncovered}),
+            **asdict(taken),
+        )
+
+    return compare
+
+
+def _predictor(
+    job: Job, cell: Cell, display: Condition, target: Tensor, learned: Artifact | None
+) -> Callable[[Tensor], tuple[Tensor, cost.Cost, Reads]]:
+    """What predicts the capture ``(C, h, w)`` of a hologram, and tells what that took and what was read."""
+    method, label = job.method(cell.method, cell.params), job.task.label
+    gate(method, cell.method, cell.code, isolation.digests(method, cell.target), cell.files)
     handle = opening.open_display(display, cell.seed, job.device).for_method(
         method,
-        task.label,
+        label,
         target.to(job.device),
         item=cell.target,
         repeat=cell.repeat,
@@ -83,47 +101,15 @@ def _foresee(job: Job) -> Foreseen:
     def predict(phase: Tensor) -> tuple[Tensor, cost.Cost, Reads]:
         own = phase[None].to(job.device, copy=True)
         with isolation.opened(method, job.device) as ready:
-            watch = cost.start(job.device, ready.pid)
+            watch = cost.Stopwatch(job.device, ready.pid)
             predicted = method.predict(own, handle)
             taken = watch.stop()
         predicted = from_numpy(predicted)
         if not is_plain(predicted) or tuple(predicted.shape) != (1, *target.shape):
-            raise wrong_output(task.label, "predict", predicted, f"an image {(1, *target.shape)}")
+            raise wrong_output(label, "predict", predicted, f"an image {(1, *target.shape)}")
         return predicted.detach().cpu()[0], taken, ready.reads
 
-    predicted, taken, reads = predict(hologram.phase)
-    answers: dict[str, float] = {}
-    if others:
-        again = others.pop(AGAIN)[1].image
-        changed = {change: (other.image, predict(own.phase)[0]) for change, (own, other) in others.items()}
-        answers = control.control(capture.image, again, predicted, changed)
-    return Foreseen(hologram, target, capture, predicted, answers, taken, learned, reads)
-
-
-def compared(job: Job, more: Callable[[Foreseen], dict[str, float]]) -> Measured:
-    """Predict the capture, and score the prediction by the protocol; ``more`` gives further scores."""
-    seen = _foresee(job)
-    cost.keep(job.timing, seen.taken.seconds)
-    wanted, factors = match(seen.capture.image, seen.target)
-    image, figures = factors.view(-1, 1, 1) * seen.prediction, more(seen)
-
-    def compare(cell: Cell, _: Condition) -> Record:
-        keep_pictures(job, cell, image, wanted, seen.hologram.phase)
-        keep_capture(job, cell, image, wanted)
-        return job.record(
-            cell,
-            scores=scores_of(job, cell, image, wanted, job.setting.metrics, seen.answers),
-            figures=figures,
-            alone=job.alone,
-            registration_residual_px=seen.capture.residual,
-            saturated=seen.capture.saturated,
-            learned=account(seen.learned),
-            reads={**seen.hologram.covered, **seen.reads.covered},
-            uncovered=tuple({*seen.hologram.uncovered, *seen.reads.uncovered}),
-            **asdict(seen.taken),
-        )
-
-    return compare
+    return predict
 
 
 def floor(job: Job) -> Measured:
@@ -163,7 +149,7 @@ def shown(job: Job, cell: Cell, display: Condition, variant: str = "") -> tuple[
     is exposed as that of the unchanged one, or ``AGAIN``; each has noise of its own."""
     photograph = (digest(cell.holograms["phase"]), display, cell.seed, cell.repeat, cell.exposure, variant)
     known = _photographs.get(photograph)
-    if known is None or isolation.changed(known[0].covered, job.setting.folder):
+    if known is None or isolation.changed(known[0].covered, job.setting.study.folder):
         hologram = _changed(job, cell, display, variant) if variant in control.CHANGES else _solved(job, cell, display)
         bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
         item = f"{cell.target}, {variant}" if variant else cell.target  # it names the noise
@@ -196,7 +182,7 @@ def _solved(job: Job, cell: Cell, display: Condition, change: str = "") -> Solut
         return known
     bench, target = opening.open_display(display, cell.seed, job.device), job.target(cell, display)
     method = job.method(name, cell.holograms["params"])
-    gate(method, name, cell.holograms["code"], digests(method, cell.target), cell.holograms["files"])
+    gate(method, name, cell.holograms["code"], isolation.digests(method, cell.target), cell.holograms["files"])
     handle = bench.for_method(method, name, target.to(job.device), item=cell.target, repeat=cell.repeat)
     wanted = changed_target(target, change, cell.seed, cell.target) if change else target
     own = wanted[None].to(job.device, copy=True)

@@ -15,7 +15,7 @@ from ...core.errors import CellError, StopError
 from ...core.seeds import generator
 from ...metrics import score
 from .. import opening
-from ..definition import Isolation
+from ..definition import Study
 from ..displays import Condition
 
 SIDE = 192  # pixels of the scored part at most: all metrics work on it, and it takes a fifth of a second
@@ -26,23 +26,22 @@ _before: dict[tuple[object, ...], Digits] = {}  # by display, panel and seed, fr
 
 
 @contextmanager
-def guarded(method: str, isolation: Isolation, display: Condition, seed: int) -> Iterator[None]:
+def guarded(method: str, study: Study, display: Condition) -> Iterator[None]:
     """Around what a ``method`` does, by its name in a config. StopError: it has changed the harness.
 
     Methods of this package are not guarded, nor those in a process of their own. What a thread changes later is not
     seen.
     """
-    if isolation != "none" or plugins.is_shipped("methods", method):
+    if study.isolation != "none" or plugins.is_shipped("methods", method):
         yield
         return
-    key = (display.digest, display.name, display.spec.shape, seed)
+    key = (display.digest, display.name, display.spec.shape, study.seed)
     if key not in _before:
-        _before[key] = digits(display, seed)
+        _before[key] = digits(display, study.seed)
     try:
         yield
     finally:
-        after = digits(display, seed)
-        before = _before[key]
+        before, after = _before[key], digits(display, study.seed)
         changed = sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
         if changed:
             found = f"after it, the same phase on {display.name} has another {changed[0]}"

@@ -36,9 +36,9 @@ def scores_of(
     """The scores of an image ``(C, h, w)`` against ``wanted``, by metric. metrics: versions of those to compute;
     answers: the columns of control, which no image alone has."""
     names = identity.named(metrics)
-    columns = score(image, wanted, metrics=names, lpips_weights=job.setting.lpips_weights)
+    columns = score(image, wanted, metrics=names, lpips_weights=job.setting.study.protocol.lpips_weights)
     if INFOCUS in metrics:
-        dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.folder)
+        dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.study.folder)
         columns |= in_focus(image, wanted, dataset.mask(cell.target, tuple(wanted.shape[-2:])))
     return identity.grouped({**columns, **answers}, metrics)
 
@@ -66,7 +66,7 @@ def keep_capture(job: Job, cell: Cell, *images: Tensor, lasting: bool = False) -
 
     lasting: of a display that exists, whose exposures cost time.
     """
-    if not job.setting.save.kept:
+    if not job.setting.study.save.kept:
         return
     buffer = io.BytesIO()
     np.save(buffer, torch.stack(images).squeeze(0).cpu().numpy(), allow_pickle=False)

@@ -16,7 +16,6 @@ from ...display.api import from_numpy, is_plain, type_name
 from ...display.phases import single
 from .. import cost, identity, isolation
 from ..displays import Condition
-from ..isolation.read_files import digests
 from ..phases import Solution, Starts
 from ..versions import gate
 from . import starts
@@ -32,7 +31,7 @@ def solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Solu
     the score. Its inputs are on the job's device; its phase returns to the CPU.
     """
     first = job.task.cells[0]
-    takes_captures = isolation.traits(first.method, job.setting.folder).camera
+    takes_captures = isolation.traits(first.method, job.setting.study.folder).camera
     with job.phases.locked(first.phase_id) if takes_captures else nullcontext():
         return _solution(job, display, target, solve)
 
@@ -49,7 +48,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
     basis = {name: first.phase[name] for name in identity.BASIS}
     shared = Starts(job.phases, basis, job.device, job.target_reads())
     method = job.method(first.method, first.params)
-    gate(method, first.method, first.code, digests(method, first.target), first.files)
+    gate(method, first.method, first.code, isolation.digests(method, first.target), first.files)
     journal = job.phases.journal(first.phase_id)
     if display.in_session:  # its photographs are found again by each import, and so are no new captures
         journal.close()
@@ -71,7 +70,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
     alone = job.alone and all(known.alone for known in shared.before)
     cost.keep(job.timing, taken.seconds)
     solved = replace(solved, captures=journal.captures, cost=taken, learned=state, alone=alone)
-    if starts.all_there(first, others):
+    if len(others) == len(first.phase.get("starts", ())):  # of those that name it, one that has failed may yet be there
         job.phases.keep(first.phase_id, solved)
     return solved
 
@@ -79,7 +78,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
 def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: Solve) -> Solution:
     """What a method finds by ``solve``. CellError for what is no phase; label: how the error calls the method."""
     with isolation.opened(method, job.device) as ready:
-        watch = cost.start(job.device, ready.pid)
+        watch = cost.Stopwatch(job.device, ready.pid)
         output, stopped = _within_budget(method, solve, handle)
         taken = watch.stop()
     output, channels = from_numpy(output), len(handle.spec.wavelengths)

@@ -12,7 +12,7 @@ from ...core.errors import CellError
 from ...core.hashing import digest
 from ..phases import Phases, start_of
 from ..plan import Cell, Plan
-from ..store import MEASURED, Store, appears, late
+from ..store import MEASURED, appears, late
 from .job import Job
 
 
@@ -21,26 +21,18 @@ def of(job: Job, cell: Cell) -> list[Tensor]:
 
     CellError for a record or a phase that does not appear: no start may be left out unseen.
     """
-    until = late()
-    done = filter(None, (_phase_id(job.store, identity, until) for identity in cell.starts))
+    until, done = late(), list[str]()
+    for identity in cell.starts:
+        _seen(job.store.path(identity), until)
+        record = job.store.read(identity)
+        if record is not None and record.state == "done":
+            done.append(digest(record.capture["phase"]))
     return [_read(job.phases, identity, until) for identity in dict.fromkeys(done)]
-
-
-def all_there(cell: Cell, found: Sequence[Tensor]) -> bool:
-    """Whether a cell has all the starts that its phase is named by: one that has failed may yet be there."""
-    return len(found) == len(cell.phase.get("starts", ()))
 
 
 def content(found: Sequence[Tensor]) -> str:
     """The sha256 of starts, whatever their names; empty for none."""
     return hashlib.sha256(b"".join(phase.numpy().tobytes() for phase in found)).hexdigest() if found else ""
-
-
-def _phase_id(store: Store, identity: str, until: float) -> str:
-    """The name of the phase behind a record; empty for one without a score."""
-    _seen(store.path(identity), until)
-    record = store.read(identity)
-    return digest(record.capture["phase"]) if record is not None and record.state == "done" else ""
 
 
 def _read(phases: Phases, identity: str, until: float) -> Tensor:

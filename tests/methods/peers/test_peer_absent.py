@@ -29,7 +29,7 @@ def test_it_is_listed_and_built_and_says_in_one_line_what_to_install(name, packa
 
     odak_sgd._odak.cache_clear()
     hide(package, monkeypatch)
-    assert "needs the extra 'peers'" in dict(KINDS["methods"]())[name]
+    assert "needs the extra 'peers'" in dict(KINDS["methods"][0]())[name]
     method = plugins.build("methods", name, {})
     why = method.available()
     assert why.startswith(f"{package} is not installed; pip install -c ")

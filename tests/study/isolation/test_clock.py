@@ -71,7 +71,7 @@ def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
     (folder / "mine.py").write_text(METHODS + more)
     method = isolation.build(f"mine.py:{name}", {}, folder)
     with isolation.opened(method, CPU) as ready:
-        watch = cost.start(CPU, ready.pid)
+        watch = cost.Stopwatch(CPU, ready.pid)
         method.solve(None, None)
         return watch.stop()
 
@@ -122,7 +122,7 @@ def test_processes_that_start_with_its_import_are_refused(tmp_path: Path) -> Non
 
 
 def test_of_this_process_all_its_processors_count() -> None:
-    watch = cost.start()
+    watch = cost.Stopwatch()
     subprocess.run([sys.executable, "-c", "import time\nwhile time.process_time() < 0.3: pass"], check=True)
     taken = watch.stop()
     assert taken.cpu_s is not None

@@ -13,7 +13,6 @@ from holobench_eval.core.device import CPU
 from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.study import isolation
 from holobench_eval.study.definition import Limits
-from holobench_eval.study.isolation import read_files
 from holobench_eval.study.isolation.messages import Channel
 from holobench_eval.study.versions import method_version
 
@@ -72,7 +71,7 @@ def use(folder: Path) -> None:
     method: Any = isolation.build("mine.py:Mine", {}, folder)
     isolation.words("mine.py:Mine", folder)
     method.available()
-    read_files.digests(method, "target")
+    isolation.digests(method, "target")
     method_version(type(method))
     isolation.measured(["mine.py:Mine"], folder)
     solver = isolation.solver("mine.py:Mine", {}, folder, "files", Limits(seconds=20))

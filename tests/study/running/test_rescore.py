@@ -53,7 +53,7 @@ MEASURES = {"picture": PICTURE, "focus": FOCUS, "prediction": PREDICTION}
 def done(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """How often a method was at work, and how many photographs were taken for a score."""
     count: Counter[str] = Counter()
-    start, photograph = cost.start, CalibratedBench.photograph
+    start, photograph = cost.Stopwatch, CalibratedBench.photograph
 
     def started(*args: Any, **named: Any) -> Any:
         count["solved"] += 1
@@ -63,7 +63,7 @@ def done(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         count["photographed"] += 1
         return photograph(*args, **named)
 
-    monkeypatch.setattr(cost, "start", started)
+    monkeypatch.setattr(cost, "Stopwatch", started)
     monkeypatch.setattr(CalibratedBench, "photograph", photographed)
     return count
 

@@ -107,7 +107,8 @@ def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pyte
         return SimpleNamespace(phase=None, covered={})
 
     monkeypatch.setattr(predicting, "_solved", solve)
-    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu", setting=SimpleNamespace(folder=Path()))
+    setting = SimpleNamespace(study=SimpleNamespace(folder=Path()))
+    job: Any = SimpleNamespace(target=lambda cell, display: None, device="cpu", setting=setting)
     display: Any = "a display"
     for version in ("before", "before", "after"):
         probe = {"name": "mine.py:Mine", "params": {}, "code": version, "phase": {"code": version}}
