@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import torch
 from torch import Tensor
@@ -127,14 +127,12 @@ class CalibratedBench(MethodHandles):
     ) -> RectifiedCapture:
         """See ``Display.photograph``."""
         check_phase(phase, self.spec, label)
-        light = self.exposure(target)
-        session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
+        light, session = self.exposure(target), partial(self.bench.session, self.seed, item, repeat, "score")
         if exposure == "matched":
-            metered = self.rectified(session.capture(phase), target)
+            metered = self.rectified(session(exposure=light).capture(phase), target)
             ratio = target.mean((-2, -1)) / metered.mean((-2, -1)).clamp_min(1e-3)
             light = tuple((torch.tensor(light) * ratio).tolist())
-            session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
-        capture = session.capture(phase)
+        capture = session(exposure=light).capture(phase)
         image = self.rectified(capture, target)
         return RectifiedCapture(
             image=image,

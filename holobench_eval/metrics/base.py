@@ -28,11 +28,6 @@ _TOLERANCE = 1e-6
 _LARGEST_KEPT = 2**18
 
 
-def always() -> str | None:
-    """The answer of a metric that needs nothing but this package: no reason against it."""
-    return None
-
-
 @dataclass(frozen=True)
 class Metric:
     """One full-reference image metric, called as ``function(image, target)``.
@@ -70,7 +65,7 @@ class Metric:
     domains: tuple[Domain, ...]
     function: Function
     smallest: int = 1
-    available: Callable[[], str | None] = always
+    available: Callable[[], str | None] = lambda: None
     title: str = ""
     unit: str = ""
     digits: int = 3
