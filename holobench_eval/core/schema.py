@@ -6,7 +6,7 @@ Checks of single values say what was meant: lengths in metres, and whatever else
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass
 from functools import cache
@@ -93,7 +93,7 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
         raise FieldError(where, _value_line(where, fault, owner)) from None
 
 
-_adapter: Callable[[type[Any]], TypeAdapter[Any]] = cache(TypeAdapter)
+_adapter = cache(TypeAdapter)
 
 
 def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = None) -> T:
@@ -119,7 +119,7 @@ def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = Non
         ``file:line:column: `` and the first fault.
     """
     try:
-        return checked(cls, document.data if data is None else data, adapter=_adapter(cls))
+        return checked(cls, document.data if data is None else data, adapter=_adapter(cls))  # type: ignore[arg-type]
     except FieldError as error:
         given, wanted = kinds_of(document.data), kinds_of(cls.__dataclass_fields__)  # type: ignore[attr-defined]
         if error.at_key and len(error.where) == 1 and given and wanted and wanted[0] not in given:

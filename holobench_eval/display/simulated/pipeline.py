@@ -259,11 +259,6 @@ class BenchSession:
     exposure: tuple[float, ...]
     frames: int = 0
 
-    @property
-    def spec(self) -> DisplaySpec:
-        """Nominal optics, public."""
-        return self.bench.spec
-
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Nothing: a simulated camera is always ready."""
 

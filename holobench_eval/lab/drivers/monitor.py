@@ -52,7 +52,7 @@ class MonitorSlm:
         self.shape = rows, columns
         self.name = f"monitor {settings.name} {columns}x{rows}"
         self._window: Window | None = None
-        self._worker = Worker(self.name, idle=lambda: self._window and self._window.pump())
+        self._worker = Worker(self.name, idle=self._pump)
         with closed_on_failure(self.close):
             self._worker.call("opening its window", SECONDS, self._open)
 
@@ -77,6 +77,10 @@ class MonitorSlm:
             raise DeviceError(
                 f"{self.name}: the window has {columns}x{rows} pixels; set this monitor's scaling to 100 %"
             )
+
+    def _pump(self) -> None:
+        if self._window:
+            self._window.pump()
 
     def _show(self, levels: Levels) -> None:
         if self._window is None:

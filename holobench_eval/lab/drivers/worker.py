@@ -25,7 +25,7 @@ class Worker:
     idle: called between the calls, some twenty times a second, for libraries that want to be looked after.
     """
 
-    def __init__(self, name: str, idle: Callable[[], object] | None = None) -> None:
+    def __init__(self, name: str, idle: Callable[[], None] | None = None) -> None:
         self.name = name
         self._idle = idle
         self._lost: str | None = None
