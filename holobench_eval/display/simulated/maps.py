@@ -6,7 +6,6 @@ import hashlib
 import io
 import math
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -170,7 +169,9 @@ def _loaded(path: Path, _state: State, size: int, sha256: str | None) -> dict[st
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             return _arrays(archive, path.name)
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, RuntimeError) as error:
+    except UserError:
+        raise
+    except Exception as error:  # whatever a reader trips over in a damaged file
         reason = " ".join(str(error).split())[:100]
         raise UserError(f"{path.name} is no npz file of plain arrays, as numpy.savez writes it ({reason})") from error
 
