@@ -13,8 +13,8 @@ from annotated_types import Interval, MinLen
 from torch import Tensor
 
 from ..core.errors import UserError, suggest
-from ..core.files import read_text
 from ..core.hashing import State, file_state
+from ..core.io import read_text
 from .base import fit, looked_from, with_channels
 from .images import RIGHT, SUFFIXES, GrayImageError, SixteenBit, decode, read
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ..core.errors import PictureError, UserError
-from ..core.files import read_regular
+from ..core.io import read_regular
 from ..core.pictures import Stored, open_picture
 from .base import from_srgb, planes
 

@@ -9,7 +9,7 @@ for every phase: learning it by gradient descent is slower and worse.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -17,6 +17,7 @@ from torch.nn import functional
 
 from ..core.errors import UserError
 from ..metrics.ms_ssim import SMALLEST_MS_SSIM, ms_ssim
+from ..optics.linear import linear
 from .common import TINY, intensity_scale, safe_amplitude
 
 LossName = Literal["intensity_l2", "amplitude_l2", "intensity_l1", "huber", "ms_ssim"]
@@ -27,26 +28,6 @@ def _relative(error: Tensor, size: Tensor) -> Tensor:
     return error.sum(dim=(-2, -1)) / size.sum(dim=(-2, -1)).clamp_min(TINY)
 
 
-class _LeastSquares(torch.autograd.Function):
-    """``min over s of sum((s I - T)^2) / sum(T^2)``; at that s its slope in I is ``2 s (s I - T) / sum(T^2)``.
-
-    Written out since it is in every step of the default method, where a recorded graph costs as much as the FFTs.
-    """
-
-    @staticmethod
-    def forward(context: Any, intensity: Tensor, target: Tensor) -> Tensor:
-        scale = _dot(intensity, target) / _dot(intensity, intensity).clamp_min(TINY)
-        size = _dot(target, target).clamp_min(TINY)
-        error = torch.mul(intensity, scale[:, None, None]).sub_(target)
-        context.save_for_backward(error, 2 * scale / size)
-        return _dot(error, error) / size
-
-    @staticmethod
-    def backward(context: Any, *slopes: Tensor) -> tuple[Tensor, None]:
-        error, factor = context.saved_tensors
-        return error * (slopes[0] * factor)[:, None, None], None
-
-
 def _dot(a: Tensor, b: Tensor) -> Tensor:
     """Sum of products per image, ``(B, h, w)`` twice to ``(B,)``."""
     total: Tensor = torch.linalg.vecdot(a.flatten(1), b.flatten(1))
@@ -54,9 +35,17 @@ def _dot(a: Tensor, b: Tensor) -> Tensor:
 
 
 def intensity_l2(intensity: Tensor, target: Tensor) -> Tensor:
-    """Squared error of intensity over the target's squared intensity (Chakravarthula et al. 2020, Eq. 12)."""
-    loss: Tensor = _LeastSquares.apply(intensity, target)  # type: ignore[no-untyped-call]
-    return loss
+    """Squared error of intensity over the target's squared intensity (Chakravarthula et al. 2020, Eq. 12).
+
+    ``min over s of sum((s I - T)^2) / sum(T^2)``; at that s its slope in I is ``2 s (s I - T) / sum(T^2)``. Written out
+    since it is in every step of the default method, where a recorded graph costs as much as the FFTs.
+    """
+    given = intensity.detach()
+    scale = _dot(given, target) / _dot(given, given).clamp_min(TINY)
+    size = _dot(target, target).clamp_min(TINY)
+    error = torch.mul(given, scale[:, None, None]).sub_(target)
+    factor = 2 * scale / size
+    return linear(lambda _: _dot(error, error) / size, lambda grad: error * (grad * factor)[:, None, None], intensity)
 
 
 def amplitude_l2(intensity: Tensor, target: Tensor) -> Tensor:

@@ -22,7 +22,7 @@ import typer
 import yaml
 
 from ..core.errors import UserError, one_line
-from ..core.files import read_regular
+from ..core.io import read_regular
 from ..core.panels import is_small
 from ..core.yaml_source import LARGEST_BYTES
 from . import options

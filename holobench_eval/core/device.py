@@ -87,7 +87,12 @@ def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
     torch.set_default_dtype(torch.float32)  # a method's file may have changed these three for everybody
     torch.set_default_device(None)
     torch.set_grad_enabled(True)
-    _seed_globally(seed("global random numbers"), device)
+    value = seed("global random numbers")  # of torch, NumPy and Python
+    random.seed(value)
+    np.random.seed(value % 2**32)  # noqa: NPY002  what a method's own code may draw from
+    torch.default_generator.manual_seed(value)  # torch.manual_seed notes the stack for a GPU not in use, in 2 ms
+    if device.type == "cuda":
+        torch.cuda.manual_seed_all(value)
     torch.set_num_threads(threads)
     cv2.setNumThreads(threads)  # else it takes all cores, those of other workers too
     torch.set_deterministic_debug_mode("error")  # use_deterministic_algorithms also imports torch's compiler, 1.5 s
@@ -99,18 +104,6 @@ def repeatable(threads: int, device: torch.device = CPU) -> Iterator[None]:
         torch.set_num_threads(before[0])
         cv2.setNumThreads(before[1])
         torch.set_deterministic_debug_mode(before[2])
-
-
-def _seed_globally(value: int, device: torch.device) -> None:
-    """The random numbers of torch, NumPy and Python.
-
-    ``torch.manual_seed`` would also note the whole stack for a GPU that is not in use, each time, which takes 2 ms.
-    """
-    random.seed(value)
-    np.random.seed(value % 2**32)  # noqa: NPY002  what a method's own code may draw from
-    torch.default_generator.manual_seed(value)
-    if device.type == "cuda":
-        torch.cuda.manual_seed_all(value)
 
 
 @cache

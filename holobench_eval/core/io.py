@@ -1,26 +1,80 @@
-"""Files: written whole or not at all, under names that any folder takes, dated alike, locked."""
+"""Files: regular ones alone are read; written whole or not at all, under names that any folder takes; locked."""
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
+import io
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import IO, TYPE_CHECKING, Final
 
-import cv2
-import numpy as np
-from torch import Tensor
-
-from .errors import StorageError
+from .errors import StorageError, UserError
 from .hashing import digest
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 TEMPORARY = ".writing-"  # how the name of a file begins that is not whole yet
 SEAL = hashlib.sha256().digest_size  # bytes at the end of a sealed file
+CONTROLS: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+"""Signs that a terminal obeys, or that turn the direction of what follows."""
+
+
+@contextmanager
+def open_regular(path: Path, most: int) -> Iterator[IO[bytes]]:
+    """A file, open for reading in bytes within a ``with``.
+
+    Parameters
+    ----------
+    path : Path
+        A regular file, or a link to one.
+    most : int
+        Its bytes at most.
+
+    Yields
+    ------
+    IO[bytes]
+        The open file.
+
+    Raises
+    ------
+    UserError
+        A pipe or a device, which may never end, or a larger file.
+    OSError
+        There is no such file, or it cannot be opened.
+    """
+    # without waiting, as a pipe would have one do until somebody writes into it
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+        state = os.fstat(file.fileno())
+        if not stat.S_ISREG(state.st_mode):
+            raise UserError(f"{path}: a pipe or a device; expected a regular file")
+        if state.st_size > most:
+            size = f"{state.st_size / 1e6:.1f} MB"
+            raise UserError(f"{path}: {size}, larger than the {most / 1e6:g} MB that such a file may have")
+        yield file
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """The bytes of a file, see `open_regular`."""
+    with open_regular(path, most) as file:
+        return file.read(most)
+
+
+def read_text(path: Path, most: int) -> str:
+    """The text of a file in UTF-8, with the ends of lines as ``\\n``, see `open_regular`. UserError: not UTF-8."""
+    with open_regular(path, most) as file:
+        try:
+            with io.TextIOWrapper(file, encoding="utf-8") as text:
+                return text.read()
+        except UnicodeDecodeError as error:
+            raise UserError(f"{path}: not UTF-8 text ({error.reason} at byte {error.start})") from None
 
 
 def now() -> str:
@@ -106,6 +160,9 @@ def file_name(text: str) -> str:
 def write_png(path: Path, levels: Tensor, bits: int, lasting: bool = True) -> None:
     """Write integer levels ``(C, h, w)``, C = 1 or 3 (red, green, blue), as a PNG of 8 or 16 bits; see
     ``write_atomically``."""
+    import cv2
+    import numpy as np
+
     kind = np.uint8 if bits == 8 else np.uint16
     picture = np.ascontiguousarray(levels.flip(0).permute(1, 2, 0).numpy().astype(kind))  # OpenCV: blue first
     encoded, buffer = cv2.imencode(".png", picture)

@@ -93,9 +93,7 @@ def checked(cls: type[T], data: Any, owner: str = "", adapter: TypeAdapter[T] | 
         raise FieldError(where, _value_line(where, fault, owner)) from None
 
 
-@cache
-def _adapter(cls: type[T]) -> TypeAdapter[T]:
-    return TypeAdapter(cls)
+_adapter = cache(TypeAdapter)
 
 
 def typed(document: Document, cls: type[T], data: Mapping[str, Any] | None = None) -> T:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from .errors import UserError
-from .files import CONTROLS, read_regular
+from .io import CONTROLS, read_regular
 
 LARGEST_BYTES = 1_000_000
 DEEPEST = 20
@@ -106,7 +106,10 @@ def parse(name: str, text: str) -> Document:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = "1:1" if mark is None else f"{mark.line + 1}:{mark.column + 1}"
-        raise UserError(f"{name}:{place}: {_sentence(error)}") from error
+        fault = " ".join(", ".join(part for part in (error.context, error.problem) if part).split())
+        if "'\\t'" in fault:
+            fault = "a tab, which YAML does not take here; use spaces"
+        raise UserError(f"{name}:{place}: {fault}") from error
     except yaml.YAMLError as error:
         raise UserError(f"{name}: not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(root, yaml.MappingNode):
@@ -116,28 +119,18 @@ def parse(name: str, text: str) -> Document:
     return Document(name, text, data, reader.keys, reader.values)
 
 
-def _sentence(error: yaml.MarkedYAMLError) -> str:
-    if "'\\t'" in str(error.problem):
-        return "a tab, which YAML does not take here; use spaces"
-    parts = [part for part in (error.context, error.problem) if part]
-    return " ".join(", ".join(parts).split())
-
-
 class _Loader(yaml.SafeLoader):
     """Composes nodes only: plain scalars resolve as in YAML 1.2, aliases are refused, depth is limited."""
 
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self._depth = 0
+    _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
+        is_alias = self.check_event(yaml.AliasEvent)
+        if is_alias or self._depth == DEEPEST:
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(None, None, "aliases (*name) are not allowed; write the value out", mark)
+            fault = "aliases (*name) are not allowed; write the value out"
+            raise yaml.MarkedYAMLError(None, None, fault if is_alias else f"nested deeper than {DEEPEST} levels", mark)
         self._depth += 1
-        if self._depth > DEEPEST:
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(None, None, f"nested deeper than {DEEPEST} levels", mark)
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
         return node

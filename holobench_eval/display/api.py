@@ -5,24 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
-import numpy as np
 import torch
 from torch import Tensor
-from torch.nn import Parameter
 
 from ..imaging.register import Registration
 from ..optics import AngularSpectrum, FourierLens, Propagator
 from ..optics.convolution import frequencies
 from ..optics.fourier import picture_pitch
-from ..optics.phase import TAU, Matrix, blaze, gray_level, refocus
-from ..optics.phasor import phasor, squared_modulus
+from ..optics.phase import TAU, Matrix, refocus
 from ..optics.transfer import transfer_function
 
 Exposure = Literal["equal", "matched"]
 Plane = Literal["fresnel", "fourier"]
-FINE = 8  # bits, whose rounding hardly shows
 DARKEST_MEAN = 0.01  # a target channel darker than this is exposed as if it had this mean: exposure stays finite
 
 
@@ -369,46 +365,6 @@ class Display(Protocol):
         """A capture in the target's frame, on its device, ``(C, h, w)`` in the unit of ``RectifiedCapture.image``."""
 
 
-def ideal_image(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """The intensity that the nominal model makes of a phase, see also ``nominal_levels``.
-
-    Parameters
-    ----------
-    phase
-        ``(C, H, W)`` [rad], or frames ``(F, C, H, W)``.
-    spec
-        The display's nominal optics.
-
-    Returns
-    -------
-    Tensor
-        ``(C, h, w)`` in the region, of frames their mean; the mean incident light on the panel is 1.
-    """
-    return spec.region.crop(ideal_light(phase, spec))
-
-
-def ideal_light(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """`ideal_image` in the entire image plane, ``(C, H, W)``, the light beside the region too."""
-    if phase.ndim == 4:
-        return torch.stack([ideal_light(frame, spec) for frame in phase]).mean(0)
-    fields = [
-        spec.propagator(channel, device=panel.device).forward(phasor(panel.new_ones(()), panel))
-        for channel, panel in enumerate(phase.float())
-    ]
-    return squared_modulus(torch.stack(fields))
-
-
-def nominal_levels(phase: Tensor, spec: DisplaySpec) -> Tensor:
-    """Nominal phase of the light where a panel is given a phase ``(..., C, H, W)`` [rad]: by the maker's table or, of
-    fewer than 8 bits, by equal steps; of more, the phase itself. The gradient is that of the phase."""
-    if not spec.levels and spec.bits >= FINE:
-        return phase
-    ramp = blaze(spec.shape, spec.blaze).to(phase)
-    colours = gray_level(phase.detach() + ramp, spec.bits).long().unbind(-3)
-    light = torch.stack([spec.level_phases(c).to(phase)[level] for c, level in enumerate(colours)], dim=-3) - ramp
-    return phase + (light - phase.detach())
-
-
 Fiducials = Callable[[Display, Tensor], Mapping[tuple[int, int], Tensor]]
 """Phases ``(C, H, W)`` [rad] of the holograms of a grid ``(C, h, w)`` that registers a display's camera, by name."""
 
@@ -441,20 +397,3 @@ def in_target_frame(capture: Capture, target: Tensor, spec: DisplaySpec, registr
 def efficiency(image: Tensor, target: Tensor) -> float:
     """``RectifiedCapture.efficiency`` of its image and the target, both ``(C, h, w)``."""
     return float((image.mean((-2, -1)) / target.mean((-2, -1)).clamp_min(DARKEST_MEAN)).mean())
-
-
-def is_plain(value: object) -> bool:
-    """Whether a value is a tensor of torch's own: another class would run its own code inside the bench."""
-    return type(value) in (Tensor, Parameter)
-
-
-def from_numpy(value: Any) -> Any:
-    """What a method returned: an array of float32 or float64 as the tensor that it stands for, all else as it is."""
-    if type(value) is not np.ndarray or value.dtype.kind != "f" or value.dtype.itemsize not in (4, 8):
-        return value
-    return torch.from_numpy(np.array(value, dtype=value.dtype.newbyteorder("="), order="C"))
-
-
-def type_name(value: object) -> str:
-    """What a value is called in messages; an array with the type of its numbers."""
-    return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__

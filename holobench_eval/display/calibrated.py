@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import torch
 from torch import Tensor
@@ -95,7 +95,11 @@ class CalibratedBench(MethodHandles):
             return self.registered_as.registration
         grid = fiducial(self.spec.region.shape)
         target = grid.image.float().expand(len(self.spec.wavelengths), -1, -1).to(self.bench.device)
-        return register(self._mean_capture(target), grid, self.bench.profile.residual_bound)
+        light, holograms = self.exposure(target), self.fiducials(self, target)
+        sessions = {name: self.bench.session(self.seed, "fiducial", *name, exposure=light) for name in holograms}
+        captures = (sessions[name].capture(phase) for name, phase in holograms.items())
+        mean = sum((capture.linear() for capture in captures), torch.zeros(())) / len(holograms)
+        return register(mean, grid, self.bench.profile.residual_bound)
 
     @cached_property
     def simulation(self) -> RegisteredSimulation:
@@ -104,13 +108,6 @@ class CalibratedBench(MethodHandles):
         coordinates = (warp.coordinates() for warp in self.registration.warps)
         resamplings = tuple(Resampling(*(torch.from_numpy(at).to(device) for at in pair)) for pair in coordinates)
         return RegisteredSimulation(self.bench, resamplings, self.bench.response.to(device))
-
-    def _mean_capture(self, target: Tensor) -> Tensor:
-        """Mean capture ``(C, Hs, Ws)`` of the holograms of the grid."""
-        light, holograms = self.exposure(target), self.fiducials(self, target)
-        sessions = {name: self.bench.session(self.seed, "fiducial", *name, exposure=light) for name in holograms}
-        captures = (sessions[name].capture(phase) for name, phase in holograms.items())
-        return sum((capture.linear() for capture in captures), torch.zeros(())) / len(holograms)
 
     def exposure(self, target: Tensor) -> tuple[float, ...]:
         """Electrons per unit of light and channel, from the target alone and so equal for every method.
@@ -130,14 +127,12 @@ class CalibratedBench(MethodHandles):
     ) -> RectifiedCapture:
         """See ``Display.photograph``."""
         check_phase(phase, self.spec, label)
-        light = self.exposure(target)
-        session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
+        light, session = self.exposure(target), partial(self.bench.session, self.seed, item, repeat, "score")
         if exposure == "matched":
-            metered = self.rectified(session.capture(phase), target)
+            metered = self.rectified(session(exposure=light).capture(phase), target)
             ratio = target.mean((-2, -1)) / metered.mean((-2, -1)).clamp_min(1e-3)
             light = tuple((torch.tensor(light) * ratio).tolist())
-            session = self.bench.session(self.seed, item, repeat, "score", exposure=light)
-        capture = session.capture(phase)
+        capture = session(exposure=light).capture(phase)
         image = self.rectified(capture, target)
         return RectifiedCapture(
             image=image,

@@ -11,19 +11,9 @@ from torch import Tensor
 
 from ..core.device import CPU
 from ..core.errors import CellError
-from .api import (
-    Camera,
-    Capture,
-    DisplaySpec,
-    Exposure,
-    RectifiedCapture,
-    Simulation,
-    efficiency,
-    from_numpy,
-    white_irradiance,
-)
+from .api import Camera, Capture, DisplaySpec, Exposure, RectifiedCapture, Simulation, efficiency, white_irradiance
 from .metered import MeteredDisplay, MethodHandles
-from .phases import check_phase
+from .phases import check_phase, from_numpy
 
 
 class Predictor(Protocol):

@@ -272,12 +272,8 @@ class MethodHandles:
         target: Tensor,
         item: str,
         repeat: int,
-        budget: int | None = None,
-        learned: Mapping[str, Any] | None = None,
-        starts: Sequence[Tensor] = (),
         sha256: str = "",
-        known: Known | None = None,
-        journal: Journal | None = None,
+        **given: Any,
     ) -> MeteredDisplay:
         """The handle that a method gets to solve a target.
 
@@ -293,12 +289,8 @@ class MethodHandles:
             Name of the target and number of the repetition: random numbers depend on them and on the display's seed.
         sha256
             Digest of the target's source.
-        budget
-            Captures that may be taken, None for no limit.
-        learned
-            What the method's ``prepare`` returned.
-        starts, known, journal
-            See ``MeteredDisplay``.
+        **given
+            Budget, learned, starts, known, journal: see ``MeteredDisplay``.
         """
-        given = (method, budget, learned, starts, item, sha256, known, journal)
-        return MeteredDisplay(self, label, target, (self.seed, item, repeat), *given)
+        names = (self.seed, item, repeat)
+        return MeteredDisplay(self, label, target, names, method, target_name=item, target_sha256=sha256, **given)

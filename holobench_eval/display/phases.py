@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import Parameter
 from torch.nn.functional import avg_pool2d
 
 from ..core.errors import CellError
 from ..optics.phase import FARTHEST, are_levels, farthest
-from .api import DisplaySpec, ideal_light, is_plain, nominal_levels, type_name
+from .api import DisplaySpec
+from .nominal import ideal_light, nominal_levels
 
 # Correlations of an image with its target. On photographs, phases of the methods here have 0.97 and more; those that
 # were found with captures and make up for faults of a display have 0.82 and more, and 0.49 on leto-aged. No other pose,
@@ -212,3 +216,20 @@ def _structure(image: Tensor, faint: float = 0.0) -> Tensor:
     norm = coarse.norm(dim=1, keepdim=True)
     least = (faint * mean).clamp_min(1e-4) * math.sqrt(coarse.shape[1])
     return torch.where(norm > least, coarse / norm.clamp_min(1e-12), 0.0)
+
+
+def is_plain(value: object) -> bool:
+    """Whether a value is a tensor of torch's own: another class would run its own code inside the bench."""
+    return type(value) in (Tensor, Parameter)
+
+
+def from_numpy(value: Any) -> Any:
+    """What a method returned: an array of float32 or float64 as the tensor that it stands for, all else as it is."""
+    if type(value) is not np.ndarray or value.dtype.kind != "f" or value.dtype.itemsize not in (4, 8):
+        return value
+    return torch.from_numpy(np.array(value, dtype=value.dtype.newbyteorder("="), order="C"))
+
+
+def type_name(value: object) -> str:
+    """What a value is called in messages; an array with the type of its numbers."""
+    return f"ndarray of {value.dtype}" if type(value) is np.ndarray else type(value).__name__

@@ -74,16 +74,16 @@ def traits_of(method: object, name: str = "") -> Traits:
 
     name: its name in messages, by default that of its class. UserError where a flag is not what it has to be.
     """
+    cls = method if isinstance(method, type) else type(method)
+    owner = f"method '{name or cls.__name__}'"
     declared: dict[str, Any] = {item.name: getattr(method, item.name, item.default) for item in fields(Traits)}
     for flag, value in declared.items():
         if flag in FLAGS and not _is_flag(flag, value):
-            cls, wanted = method if isinstance(method, type) else type(method), WANTED.get(flag, "True or False")
-            raise UserError(f"method '{name or cls.__name__}': {flag} should be {wanted}")
+            raise UserError(f"{owner}: {flag} should be {WANTED.get(flag, 'True or False')}")
     has = frozenset(function for function in FUNCTIONS if callable(getattr(method, function, None)))
     for flag, function in SCENES.items():
         if declared[flag] and function not in has:
-            cls = method if isinstance(method, type) else type(method)
-            raise UserError(f"method '{name or cls.__name__}': {flag} is True, which needs a function {function}")
+            raise UserError(f"{owner}: {flag} is True, which needs a function {function}")
     return Traits(**declared | {"functions": has})
 
 

@@ -50,7 +50,10 @@ def second_warp(frame: Frame, reference: Frame, first: Warp) -> Warp | None:
     if reference.shape != first.shape:
         raise ValueError(f"reference {reference.shape} and region {first.shape} must have one shape")
     wanted = _relief(reference)
-    warp = Warp(first.shape, _nearest_homography(first), np.zeros((6, 2)))
+    axes = (np.linspace(0, side - 1, 7) for side in reversed(first.shape))
+    points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    nearest = np.asarray(cv2.findHomography(points, first.to_sensor(points), 0)[0], dtype=np.float64)
+    warp = Warp(first.shape, nearest, np.zeros((6, 2)))
     for parts in DIVISIONS:
         moved = _displaced_blocks(frame, wanted, warp, parts)
         if moved is None:
@@ -73,13 +76,6 @@ def disagreement(first: Warp, second: Warp) -> float:
     """Largest distance [region px] between where two warps put a corner of the region."""
     apart = np.linalg.norm(first.corners() - second.corners(), axis=1)
     return float(apart.max() / first.scale())
-
-
-def _nearest_homography(warp: Warp) -> Array:
-    """The homography nearest to a warp, its distortion left out."""
-    height, width = warp.shape
-    points = np.stack(np.meshgrid(np.linspace(0, width - 1, 7), np.linspace(0, height - 1, 7)), axis=-1).reshape(-1, 2)
-    return np.asarray(cv2.findHomography(points, warp.to_sensor(points), 0)[0], dtype=np.float64)
 
 
 def _margin(shape: tuple[int, int]) -> int:
@@ -113,7 +109,8 @@ def _displaced_blocks(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Bl
     if not seen.std() > 0:
         return None
     if parts == 1:
-        return _single_block(seen, np.pad(wanted, border), warp.shape)
+        centre = np.array([[warp.shape[1] - 1.0, warp.shape[0] - 1.0]]) / 2
+        return Blocks(centre, _shift(seen, np.pad(wanted, border), 1)[None], np.eye(2)[None])
     seen = seen[border:-border, border:-border]
     rows, columns = (_spans(side, parts) for side in warp.shape)
     blocks = [_block(seen, wanted, row, column) for row in rows for column in columns]
@@ -122,12 +119,6 @@ def _displaced_blocks(frame: Frame, wanted: Frame, warp: Warp, parts: int) -> Bl
         return None
     centres, displacements, weights = (np.array(part) for part in zip(*kept, strict=True))
     return Blocks(centres, displacements, weights)
-
-
-def _single_block(seen: Frame, wanted: Frame, shape: tuple[int, int]) -> Blocks:
-    shift = _shift(seen, wanted, 1)
-    centre = np.array([[shape[1] - 1.0, shape[0] - 1.0]]) / 2
-    return Blocks(centre, shift[None], np.eye(2)[None])
 
 
 def _shift(seen: NDArray[np.floating], wanted: NDArray[np.floating], fineness: int) -> Array:

@@ -24,7 +24,9 @@ def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
     """
     smooth = cv2.GaussianBlur(frame, (0, 0), SAMPLE_BLUR * warp.scale())
     picture = warp.sample(np.asarray(smooth))
-    picture = picture - _ground(picture, grid)
+    dark = (grid.image.numpy() == 0).astype(np.float32)
+    ground, share = (cv2.GaussianBlur(each, (0, 0), GROUND_BLUR * grid.spacing) for each in (picture * dark, dark))
+    picture = picture - np.asarray(ground / share)  # the local mean over the dark pixels of the grid
     light = np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.5 * grid.radius))
     columns, rows = np.round(grid.centres).astype(int).T
     circles = light[rows, columns].astype(np.float64)
@@ -32,13 +34,6 @@ def even_picture(frame: Frame, warp: Warp, grid: FiducialGrid) -> Frame:
     fit = np.linalg.lstsq(quadratic_terms(grid.centres, grid.shape), circles, rcond=None)[0]
     beam = np.exp(quadratic_surface(fit, grid.shape))
     return compress(np.asarray(picture / beam, dtype=np.float32))
-
-
-def _ground(picture: Frame, grid: FiducialGrid) -> Frame:
-    """Light between the circles, ``(h, w)``: the local mean over the dark pixels of the grid."""
-    dark = (grid.image.numpy() == 0).astype(np.float32)
-    light, share = (cv2.GaussianBlur(each, (0, 0), GROUND_BLUR * grid.spacing) for each in (picture * dark, dark))
-    return np.asarray(light / share)
 
 
 def compress(light: Frame) -> Frame:

@@ -19,8 +19,9 @@ from ..core.panels import is_small, rows_and_columns
 from ..core.plugins import build
 from ..datasets.base import fit, with_channels
 from ..datasets.images import decode, from_array, read
-from ..display.api import DisplaySpec, from_numpy, ideal_image, is_plain, nominal_levels, type_name
-from ..display.phases import check_phase, phase_doubt, single
+from ..display.api import DisplaySpec
+from ..display.nominal import ideal_image, nominal_levels
+from ..display.phases import check_phase, from_numpy, is_plain, phase_doubt, single, type_name
 from ..display.traits import refuse_plane, traits_of
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition

@@ -82,14 +82,9 @@ def _frame(raw: Any, where: str) -> RawFrame:
     first, second = (plane.astype(np.float64) for plane in planes["G"])
     green = np.where(np.maximum(first, second) >= white, np.maximum(first, second), np.rint((first + second) / 2))
     counts = np.stack([planes["R"][0], green.astype(np.uint16), planes["B"][0]], axis=-1)
-    black = _black(raw, letters)
+    levels = list(zip(raw.black_level_per_channel, letters, strict=False))  # green has two
+    means = [np.mean([level for level, letter in levels if letter == wanted]) for wanted in "RGB"]
+    black = np.array(means, dtype=np.float32)[:, None, None]
     if black.max() >= white:
         raise UserError(f"{where}: black at {black.max():g} counts and white at {white:g}; expected black below")
     return RawFrame(counts, white, black)
-
-
-def _black(raw: Any, letters: str) -> NDArray[np.float32]:
-    """Black levels of red, green (the mean of its two) and blue."""
-    sites = list(zip(raw.black_level_per_channel, letters, strict=False))
-    levels = [np.mean([level for level, letter in sites if letter == wanted]) for wanted in "RGB"]
-    return np.array(levels, dtype=np.float32)[:, None, None]

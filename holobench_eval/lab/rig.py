@@ -98,9 +98,23 @@ class Rig:
         """
         self._check_phase(pattern.phase)
         try:
-            return self._prepare(pattern, say)
+            exposures = tuple(self._exposure(pattern, channel) for channel in range(len(self.planes)))
+            say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
+            settle = self._settle(pattern.phase, exposures[0] * pattern.relative_exposure)
+            say(f"settling: {settle * 1e3:.0f} ms{'' if self.settings.settle == 'auto' else ' (as set)'}")
+            darks = self._darks(exposures)
+            counts = [float(np.mean(dark.at(each))) for dark, each in zip(darks, exposures, strict=True)]
+            level = ", ".join(f"{each:.1f}" for each in counts)
+            say(f"dark: {level} counts{'' if self.settings.dark_frames else ' (as set)'}")
+            ready = Prepared(exposures, darks, settle)
+            for check in self._checks(pattern, ready):
+                if not check.passed:
+                    raise UserError(check.line)
+                say(check.line)
         except DeviceError as error:
             raise UserError(f"the bench is not ready: {error}") from error
+        self.prepared = ready
+        return ready
 
     def close(self) -> None:
         """Lasers off, devices given back."""
@@ -110,22 +124,6 @@ class Rig:
             self.slm.close()
         finally:
             self.camera.close()
-
-    def _prepare(self, pattern: Request, say: Callable[[str], None]) -> Prepared:
-        exposures = tuple(self._exposure(pattern, channel) for channel in range(len(self.planes)))
-        say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
-        settle = self._settle(pattern.phase, exposures[0] * pattern.relative_exposure)
-        say(f"settling: {settle * 1e3:.0f} ms{'' if self.settings.settle == 'auto' else ' (as set)'}")
-        darks = self._darks(exposures)
-        level = ", ".join(f"{float(np.mean(dark.at(each))):.1f}" for dark, each in zip(darks, exposures, strict=True))
-        say(f"dark: {level} counts{'' if self.settings.dark_frames else ' (as set)'}")
-        ready = Prepared(exposures, darks, settle)
-        for check in self._checks(pattern, ready):
-            if not check.passed:
-                raise UserError(check.line)
-            say(check.line)
-        self.prepared = ready
-        return ready
 
     def _exposure(self, pattern: Request, channel: int) -> float:
         given = self.settings.exposures(len(self.planes))

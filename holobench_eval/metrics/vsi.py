@@ -88,9 +88,7 @@ def _saliency(rgb: Tensor, of_small: Callable[[Tensor], Tensor]) -> Tensor:
     return _unit_range(functional.interpolate(of_small(small), rgb.shape[-2:], mode="bilinear", align_corners=True))
 
 
-@remembered
-def _saliency_of_target(rgb: Tensor) -> Tensor:
-    return _saliency(rgb, _priors_of_target)
+_saliency_of_target = remembered(lambda rgb: _saliency(rgb, _priors_of_target))
 
 
 def vsi(image: Tensor, target: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""Linear maps whose adjoint is written out, where autograd would take longer or more memory."""
+"""Maps whose gradient is written out, where autograd would take longer or more memory: linear ones by their adjoint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ Map = Callable[[Tensor], Tensor]
 
 
 def linear(forward: Map, adjoint: Map, values: Tensor) -> Tensor:
-    """``forward`` of values, whose gradient is ``adjoint`` of that of the result; differentiable once."""
+    """``forward`` of values, whose gradient is ``adjoint`` of that of the result; differentiable once.
+
+    Other maps than linear ones have a derivative at the values, which ``adjoint`` then knows.
+    """
     result: Tensor = _Linear.apply(values, forward, adjoint)  # type: ignore[no-untyped-call]
     return result
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
+
+from .linear import linear
 
 
 def phasor(amplitude: Tensor, phase: Tensor) -> Tensor:
@@ -29,8 +28,10 @@ def phasor(amplitude: Tensor, phase: Tensor) -> Tensor:
     >>> phasor(torch.tensor(2.0), torch.tensor([0.0, torch.pi / 2])).abs()
     tensor([2., 2.])
     """
-    field: Tensor = _Phasor.apply(amplitude.detach(), phase)  # type: ignore[no-untyped-call]
-    return field
+    size, angle = amplitude.detach(), phase.detach()
+    field = torch.complex(angle.cos().mul_(size), angle.sin().mul_(size))
+    kept = field.detach()  # the field itself will hold what holds this
+    return linear(lambda _: field, lambda grad: (grad.imag * kept.real).sub_(grad.real * kept.imag), phase)
 
 
 def mean_phasor(phase: Tensor, dim: int) -> Tensor:
@@ -48,54 +49,16 @@ def mean_phasor(phase: Tensor, dim: int) -> Tensor:
     >>> mean_phasor(torch.tensor([0.0, torch.pi]), 0).abs() < 1e-6
     tensor(True)
     """
-    field: Tensor = _MeanPhasor.apply(phase, dim)  # type: ignore[no-untyped-call]
-    return field
+    cosine, sine = phase.detach().cos(), phase.detach().sin()
+
+    def back(grad: Tensor) -> Tensor:
+        real, imaginary = ((part / phase.shape[dim]).unsqueeze(dim) for part in (grad.real, grad.imag))
+        return (cosine * imaginary).sub_(sine * real)
+
+    return linear(lambda _: torch.complex(cosine.mean(dim), sine.mean(dim)), back, phase)
 
 
 def squared_modulus(field: Tensor) -> Tensor:
     """``|field|^2`` of a complex field; differentiable once."""
-    intensity: Tensor = _SquaredModulus.apply(field)  # type: ignore[no-untyped-call]
-    return intensity
-
-
-class _Phasor(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, amplitude: Tensor, phase: Tensor) -> Tensor:
-        field = torch.complex(phase.cos().mul_(amplitude), phase.sin().mul_(amplitude))
-        ctx.save_for_backward(field)
-        return field
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[None, Tensor]:
-        (field,) = ctx.saved_tensors
-        return None, (grad.imag * field.real).sub_(grad.real * field.imag)
-
-
-class _MeanPhasor(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, phase: Tensor, dim: int) -> Tensor:
-        cosine, sine = phase.cos(), phase.sin()
-        ctx.dim = dim
-        ctx.save_for_backward(cosine, sine)
-        return torch.complex(cosine.mean(dim), sine.mean(dim))
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
-        cosine, sine = ctx.saved_tensors
-        real, imaginary = ((part / cosine.shape[ctx.dim]).unsqueeze(ctx.dim) for part in (grad.real, grad.imag))
-        return (cosine * imaginary).sub_(sine * real), None
-
-
-class _SquaredModulus(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, field: Tensor) -> Tensor:
-        ctx.save_for_backward(field)
-        return field.real.square() + field.imag.square()
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> Tensor:
-        (field,) = ctx.saved_tensors
-        return field * (2 * grad)
+    given = field.detach()
+    return linear(lambda _: given.real.square() + given.imag.square(), lambda grad: given * (2 * grad), field)

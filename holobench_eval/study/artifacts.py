@@ -21,9 +21,8 @@ from typing import IO, Any
 import torch
 
 from ..core.errors import UserError, reason
-from ..core.files import open_regular
 from ..core.hashing import State, digest, file_digest, file_state
-from ..core.io import TEMPORARY, file_name, locked, write_atomically
+from ..core.io import TEMPORARY, file_name, locked, open_regular, write_atomically
 from ..display.account import Journal
 from .displays import Preparation
 from .isolation import changed

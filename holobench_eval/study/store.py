@@ -17,9 +17,8 @@ from pydantic import FiniteFloat, StringConstraints, TypeAdapter, ValidationErro
 from typing_extensions import TypedDict  # pydantic takes that of Python from 3.12 on alone
 
 from ..core.errors import UserError
-from ..core.files import read_regular
 from ..core.hashing import canonical, digest
-from ..core.io import TEMPORARY, file_name, locked, write_atomically
+from ..core.io import TEMPORARY, file_name, locked, read_regular, write_atomically
 from . import identity, isolation
 from .plan import Cell, Plan
 

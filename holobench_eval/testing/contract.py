@@ -16,7 +16,7 @@ from ..core.hashing import canonical
 from ..core.plugins import params_of
 from ..core.seeds import generator
 from ..display import CalibratedBench, MeteredDisplay, load_profile
-from ..display.api import from_numpy, is_plain, type_name
+from ..display.phases import from_numpy, is_plain, type_name
 from ..display.training import TrainingBench, TrainingImage
 from ..display.traits import traits_of
 from ..study.artifacts import FolderMemory

@@ -14,6 +14,7 @@ from annotated_types import Interval
 from torch import Tensor, nn
 
 from ...display.api import DisplaySpec
+from ...display.nominal import propagated
 from ...optics.phasor import squared_modulus
 from ..common import safe_amplitude, unit_field
 from ..learned.samples import Steps
@@ -42,10 +43,7 @@ class TwoNetworks(nn.Module):
         """Intensity ``(C, h, w)`` in the region for a phase ``(C, H, W)`` [rad]."""
         lit = parts(unit_field(phase))
         real, imaginary = (lit + self.panel(lit)).unbind(1)
-        panel = torch.complex(real, imaginary)
-        models = [self.spec.propagator(channel, device=panel.device) for channel in range(len(panel))]
-        propagated = [model.forward(field) for model, field in zip(models, panel, strict=True)]
-        field = self.spec.region.crop(torch.stack(propagated))
+        field = self.spec.region.crop(propagated(torch.complex(real, imaginary), self.spec))
         amplitude = safe_amplitude(squared_modulus(field)) + self.target(parts(field))[:, 0]
         return amplitude.square() * torch.exp(self.brightness)[:, None, None]
 

@@ -19,7 +19,8 @@ import torch
 from torch import Tensor, nn
 
 from ...core.graphs import is_recorded
-from ...display.api import DisplaySpec, ideal_light
+from ...display.api import DisplaySpec
+from ...display.nominal import ideal_light
 
 DEGREE = 4  # of the polynomial: a Gaussian beam off its centre needs 2, a cos^4 vignetting 4
 FIRST_BLUR, FIRST_SHARE, FIRST_REACH = 0.4, 0.05, 0.1  # px; of the light; of the panel's height

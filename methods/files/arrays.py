@@ -44,7 +44,8 @@ def read_array(path: Path, variable: str = "", content: bytes | None = None) -> 
         if suffix == ".mat":
             array = _matlab(path, variable)
         else:
-            array = _content(path.read_bytes() if content is None else content, suffix, variable)
+            content = path.read_bytes() if content is None else content
+            array = _picture(content) if suffix in PICTURES else _numbers(content, suffix, variable)
     except CellError as error:
         raise CellError(f"{path}: {error}") from None
     except Exception as error:  # whatever a reader trips over in a damaged file
@@ -55,29 +56,22 @@ def read_array(path: Path, variable: str = "", content: bytes | None = None) -> 
     return array.astype(array.dtype.newbyteorder("="), copy=False)  # the machine's own, as torch demands
 
 
-def _content(content: bytes, suffix: str, variable: str) -> NDArray[Any]:
-    return _picture(content) if suffix in PICTURES else _numbers(content, suffix, variable)
-
-
 def _picture(content: bytes) -> NDArray[Any]:
     """The levels of a picture that are stored as they are: not turned, and not stretched to 8 bits."""
     try:
         stored = open_picture(content, MOST_PIXELS)
-        if stored.format not in FORMATS:
-            raise CellError(f"no picture of 8 or 16 bits that can be read as {', '.join(FORMATS)}")
-        if stored.has_alpha:
-            raise CellError("a picture with alpha; expected gray or RGB")
-        if stored.orientation != 1:
-            raise CellError(
-                f"a picture with EXIF orientation {stored.orientation}; expected one that is stored upright"
-            )
-        if stored.is_floating or stored.bits not in (8, 16):
-            kind = "floating-point " if stored.is_floating else ""
-            raise CellError(f"a {stored.bits}-bit {kind}picture; expected 8 or 16 bits")
-        if stored.has_palette:  # its values are places in a table, whose colours may be the levels or anything else
-            raise CellError("a picture with a palette; expected gray or RGB, whose values are the levels themselves")
-        if stored.is_lossy:
-            raise CellError("a picture that is compressed with loss; expected its levels as they are")
+        turned, kind = stored.orientation, f"{stored.bits}-bit {'floating-point ' if stored.is_floating else ''}picture"
+        for is_other, fault in (
+            (stored.format not in FORMATS, f"no picture of 8 or 16 bits that can be read as {', '.join(FORMATS)}"),
+            (stored.has_alpha, "a picture with alpha; expected gray or RGB"),
+            (turned != 1, f"a picture with EXIF orientation {turned}; expected one that is stored upright"),
+            (stored.is_floating or stored.bits not in (8, 16), f"a {kind}; expected 8 or 16 bits"),
+            # the values of a palette are places in a table, whose colours may be the levels or anything else
+            (stored.has_palette, "a picture with a palette; expected gray or RGB, whose values are the levels"),
+            (stored.is_lossy, "a picture that is compressed with loss; expected its levels as they are"),
+        ):
+            if is_other:
+                raise CellError(fault)
         return stored.values()
     except PictureError as error:
         raise CellError(f"no picture of 8 or 16 bits that can be read: {error}") from None

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -18,22 +18,14 @@ from ...core.errors import CellError, UserError
 from ...core.io import file_name
 from ...core.plugins import LATER
 from ...display.api import DisplaySpec
+from ...display.metered import MeteredDisplay
 from ...imaging.convention import Convention, Correction, FullTurn
 from ...optics.phase import are_levels
-from ..common import Bench
 from ..double_phase import encode
 from .arrays import SUFFIXES, read_array
 from .correction import on_panel, refuse_colours
 
 COLOURS = ("red", "green", "blue")
-
-
-class NamedBench(Bench, Protocol):
-    """A bench that tells which target is solved."""
-
-    @property
-    def target_name(self) -> str:
-        """The name of the target in its dataset."""
 
 
 @dataclass(frozen=True)
@@ -149,14 +141,14 @@ class Phases:
                         "{target} in the place of {stem} tells them apart"
                     )
 
-    def solve(self, target: Tensor, bench: NamedBench) -> Tensor:
+    def solve(self, target: Tensor, bench: MeteredDisplay) -> Tensor:
         """The phase that the target's file holds.
 
         Parameters
         ----------
         target : Tensor
             Linear intensity ``(B, C, h, w)`` in [0, 1]; only its number of images and colours is used.
-        bench : NamedBench
+        bench : MeteredDisplay
             Nominal optics in SI units, and the name of the target.
 
         Returns
@@ -221,7 +213,12 @@ class Phases:
         if array.ndim == 2:
             array = array[None]
         if array.shape != (colours, *spec.shape):
-            raise CellError(f"{path}: {_described(array)}; {_wanted(spec, colours)}")
+            described = " x ".join(map(str, array.shape)) + f" values of type {array.dtype}"
+            wanted = " x ".join(map(str, spec.shape)) + (f" in {colours} colours" if colours > 1 else ", one colour")
+            raise CellError(
+                f"{path}: {described}; '{spec.name}' shows {wanted} here, and phases are not resampled (the panel is "
+                "set by display.panel)"
+            )
         if self.order == "bgr":
             array = array[::-1]
         values = self._radians(array, path, panel) if panel else _real(array, path)
@@ -276,13 +273,3 @@ def _real(array: NDArray[Any], path: str) -> NDArray[Any]:
     if array.dtype.kind == "c" or bool((array < 0).any()):
         raise CellError(f"{path}: amplitudes are real and not negative")
     return array.astype(np.float64)
-
-
-def _described(array: NDArray[Any]) -> str:
-    return " x ".join(map(str, array.shape)) + f" values of type {array.dtype}"
-
-
-def _wanted(spec: DisplaySpec, colours: int) -> str:
-    rows, columns = spec.shape
-    of = f"{rows} x {columns}" + (f" in {colours} colours" if colours > 1 else ", one colour")
-    return f"'{spec.name}' shows {of} here, and phases are not resampled (the panel is set by display.panel)"

@@ -16,11 +16,12 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
+from ...display.nominal import propagated
 from ...optics.phasor import phasor
 from ..hil.generator import crop_to, pad_to_multiple
 from ..learned.samples import Steps
 from ..learned.weights import draw_weights
-from .fields import at_panel, coloured
+from .fields import coloured
 from .method import WIDTH, OnePass
 
 
@@ -72,7 +73,7 @@ class TwoComplexNetworks(nn.Module):
     def forward(self, amplitude: Tensor) -> Tensor:
         """Amplitude ``(C, H, W)`` to phase ``(C, H, W)`` [rad]."""
         angle = self.image(coloured(amplitude[:, None]).to(torch.complex64)).angle()
-        field = at_panel(phasor(amplitude, angle), self.spec)
+        field = propagated(phasor(amplitude, angle), self.spec, back=True)
         shown: Tensor = self.panel(coloured(field[:, None]))
         return shown.angle()
 

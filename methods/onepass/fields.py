@@ -1,11 +1,10 @@
-"""What one-pass networks are made of: what they see of a colour, and the way from the image plane to the panel."""
+"""What one-pass networks are made of: what they see of a colour, and how their phases are encoded."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-from ...display.api import DisplaySpec
 from ..double_phase import encode
 
 LARGEST = 0.999  # amplitude that is encoded; the slope of the arc cosine is infinite at 1
@@ -22,12 +21,6 @@ def coloured(images: Tensor) -> Tensor:
 def bounded(phase: Tensor) -> Tensor:
     """A phase [rad] that a network gives, brought smoothly into (-pi, pi), where the publications cut it."""
     return torch.pi * torch.tanh(phase / torch.pi)
-
-
-def at_panel(field: Tensor, spec: DisplaySpec) -> Tensor:
-    """A field ``(C, H, W)`` at the image plane, brought back to the panel by the nominal optics."""
-    models = [spec.propagator(channel, device=field.device) for channel in range(len(field))]
-    return torch.stack([model.adjoint(plane) for model, plane in zip(models, field, strict=True)])
 
 
 def double_phase(field: Tensor) -> Tensor:

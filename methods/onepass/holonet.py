@@ -14,10 +14,11 @@ from annotated_types import Interval
 from torch import Tensor, nn
 
 from ...display.api import DisplaySpec
+from ...display.nominal import propagated
 from ...optics.phasor import phasor
 from ..hil.baselines import UNet
 from ..learned.weights import draw_weights, start_at_zero
-from .fields import at_panel, bounded, coloured, double_phase
+from .fields import bounded, coloured, double_phase
 from .method import WIDTH, OnePass
 
 Encoding = Literal["double_phase", "phase"]
@@ -40,7 +41,7 @@ class HoloNetwork(nn.Module):
     def forward(self, amplitude: Tensor) -> Tensor:
         """Amplitude ``(C, H, W)`` to phase ``(C, H, W)`` [rad]."""
         angle = bounded(self.image(coloured(amplitude[:, None]))[:, 0])
-        field = at_panel(phasor(amplitude, angle), self.spec)
+        field = propagated(phasor(amplitude, angle), self.spec, back=True)
         encoded, light = self.encode(field), field.abs()
         light = light / light.amax((-2, -1), keepdim=True).clamp_min(torch.finfo(light.dtype).tiny)
         seen = torch.stack([light, encoded.cos(), encoded.sin()], 1)

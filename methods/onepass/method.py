@@ -13,8 +13,9 @@ import torch
 from annotated_types import Interval
 from torch import Tensor, nn
 
-from ...display.api import DisplaySpec, ideal_image, nominal_levels
+from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
+from ...display.nominal import ideal_image, nominal_levels
 from ...display.training import TrainingBench
 from ..calibrated.approximator import PredictedCapture
 from ..calibrated.parametric import ParametricModel

@@ -13,10 +13,11 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ...display.api import DisplaySpec
+from ...display.nominal import propagated
 from ..common import unit_field
 from ..double_phase import AntiAliasedDoublePhase
 from ..learned.weights import draw_weights, start_at_zero
-from .fields import at_panel, coloured, double_phase
+from .fields import coloured, double_phase
 from .method import WIDTH, OnePass
 
 BLOCKS = 4  # pairs of convolutions; 14 in the publication
@@ -39,7 +40,7 @@ class ResidualNetwork(nn.Module):
         for one, other in zip(self.blocks[::2], self.blocks[1::2], strict=True):
             x = x + other(functional.relu(one(functional.relu(x))))
         change, angle = self.last(functional.relu(x)).unbind(1)
-        field = at_panel((amplitude + change) * unit_field(angle), self.spec)
+        field = propagated((amplitude + change) * unit_field(angle), self.spec, back=True)
         return double_phase(self.antialiased.filter(field, self.spec.pitch))
 
 

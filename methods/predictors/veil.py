@@ -15,8 +15,9 @@ import torch
 from annotated_types import Interval
 from torch import Tensor
 
-from ...display.api import Region, ideal_light
+from ...display.api import Region
 from ...display.metered import MeteredDisplay
+from ...display.nominal import ideal_light
 from ...display.training import TrainingBench, TrainingImage
 from ..calibrated.patterns import dark_patterns
 from ..calibrated.terms import scattered

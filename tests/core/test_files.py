@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.core.files import read_regular, read_text
+from holobench_eval.core.io import read_regular, read_text
 from holobench_eval.core.yaml_source import load, parse
 from holobench_eval.interactive import load_records
 from holobench_eval.report.compare.paired import read_run

@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core import seeds
-from holobench_eval.display.api import DisplaySpec, Region, ideal_image, white_irradiance
+from holobench_eval.display.api import DisplaySpec, Region, white_irradiance
+from holobench_eval.display.nominal import ideal_image
 
 
 @dataclass

@@ -120,7 +120,7 @@ EMPTY = {"model": {"table": torch.empty(3, 17, device="meta")}}
 
 
 FAULTS: dict[str, tuple[Callable[[Path], None], str]] = {
-    "another byte": (cut, "is not the file that the profile describes"),
+    "another byte": (cut, "another file, or damaged"),
     "no file": (lambda folder: (folder / "net.pt").unlink(), "cannot be read"),
     "a link": (linked, "is a link that leaves the profile's folder"),
     "a place outside": (lambda folder: rewrite(folder / "net.yaml", network={"file": "../net.pt"}), "is not a file in"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import torch
 from torch import Tensor
 
@@ -14,35 +12,24 @@ from .stages.crosstalk import sample_positions
 from .stages.propagation import Propagation
 
 
-@dataclass(frozen=True, eq=False)
 class FourierPath:
-    """From the sub-samples of a panel to a Fourier plane, see ``optics.fourier``.
+    """From the sub-samples of a panel to a Fourier plane, see ``optics.fourier``, for a line of the source.
 
-    shape: of the panel; samples: sub-samples a pixel and axis; rows ``(n H, samples H)``, columns ``(n W, samples W)``:
-    the transform of one wavelength along each axis.
+    The grid stays where the nominal optics have it, so that another wavelength has a picture of another size. finer:
+    samples a pixel and axis of the image; rows ``(n H, samples H)``, columns ``(n W, samples W)``: the transform along
+    each axis.
     """
 
-    shape: tuple[int, int]
-    samples: int
-    rows: Tensor
-    columns: Tensor
-
-    @classmethod
-    def of(cls, geometry: Geometry, way: Propagation, finer: int) -> FourierPath:
-        """That of a line of the source; finer: samples a pixel and axis of the image.
-
-        The grid stays where the nominal optics have it, so that another wavelength has a picture of another size.
-        """
+    def __init__(
+        self, geometry: Geometry, way: Propagation, finer: int, device: torch.device, dtype: torch.dtype
+    ) -> None:
         assert geometry.image_pitch is not None
         wavelength = geometry.wavelength * (1 + way.wavelength_error)
         step = geometry.image_pitch * geometry.pitch / (wavelength * geometry.distance)
         positions = sample_positions(geometry.samples)
-        rows, columns = (fourier_matrix(side, side, step, positions, finer) for side in geometry.shape)
-        return cls(geometry.shape, geometry.samples, rows.to(torch.complex64), columns.to(torch.complex64))
-
-    def to(self, device: torch.device) -> FourierPath:
-        """The same on a device."""
-        return replace(self, rows=self.rows.to(device), columns=self.columns.to(device))
+        matrices = (fourier_matrix(side, side, step, positions, finer) for side in geometry.shape)
+        self.rows, self.columns = (matrix.to(device, dtype) for matrix in matrices)
+        self.shape, self.samples = geometry.shape, geometry.samples
 
     def forward(self, field: Tensor) -> Tensor:
         """See ``LightPath``."""

@@ -5,33 +5,27 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-import re
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePath
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import torch
 from annotated_types import Interval
+from numpy.lib.format import read_array_header_1_0, read_magic
 from torch import Tensor
 from torch.nn import functional
 
 from ...core.errors import UserError, suggest
-from ...core.files import open_regular
 from ...core.hashing import State, file_state
+from ...core.io import read_regular
 from ...optics.zernike import NAMES
 
 LARGEST = 20_000_000  # bytes of a file, and of its arrays
 HEADERS = 1_000  # bytes of the header of each array, at most
-HEADER = re.compile(
-    rb"\x93NUMPY\x01\x00..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), "
-    rb"'shape': \(([\d, ]{0,60})\),? *\} *\n",
-    re.DOTALL,
-)
 
 
 @dataclass(frozen=True)
@@ -155,22 +149,29 @@ def inside(name: str, folder: Path) -> Path:
     return path
 
 
-@lru_cache(maxsize=4)
-def _loaded(path: Path, _state: State, size: int, sha256: str | None) -> dict[str, Tensor]:
-    """The arrays of a file that is as the profile says; read once while it stays as it is."""
+def described(path: Path, most: int, size: int, sha256: str | None) -> bytes:
+    """The bytes of a file, ``most`` at most. UserError: it cannot be read, or is not as the profile says."""
     try:
-        with open_regular(path, LARGEST) as file:
-            content = file.read(LARGEST)
+        content = read_regular(path, most)
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) != size:
         raise UserError(f"{path.name} has {len(content)} bytes, and the profile says {size}: another file, or damaged")
     if hashlib.sha256(content).hexdigest() != (sha256 or "").lower():
         raise UserError(f"{path.name} has another SHA-256 than the profile says: another file, or damaged")
+    return content
+
+
+@lru_cache(maxsize=4)
+def _loaded(path: Path, _state: State, size: int, sha256: str | None) -> dict[str, Tensor]:
+    """The arrays of a file that is as the profile says; read once while it stays as it is."""
+    content = described(path, LARGEST, size, sha256)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             return _arrays(archive, path.name)
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, RuntimeError) as error:
+    except UserError:
+        raise
+    except Exception as error:  # whatever a reader trips over in a damaged file
         reason = " ".join(str(error).split())[:100]
         raise UserError(f"{path.name} is no npz file of plain arrays, as numpy.savez writes it ({reason})") from error
 
@@ -193,18 +194,17 @@ def _content(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
 
 
 def _array(content: bytes, key: str, name: str) -> Tensor:
-    """An array. Its header is read here, since NumPy's reader evaluates it and believes what it promises."""
-    header = HEADER.match(content)
-    if header is None:
+    """An array. NumPy's reader would believe what its header promises."""
+    file = io.BytesIO(content)
+    if read_magic(file) != (1, 0):
         raise ValueError(f"'{key}' has no header of an array")
-    kind, columns_first, sides = header.groups()
-    if kind != b"<f4":
-        raise UserError(f"{name}: '{key}' is of the type {kind.decode(errors='replace')!r}; expected float32, '<f4'")
-    shape = [int(side) for side in sides.split(b",") if side.strip()]
-    if 4 * math.prod(shape) != len(content) - header.end():
+    shape, columns_first, kind = read_array_header_1_0(file, max_header_size=HEADERS)
+    if kind != "<f4":
+        raise UserError(f"{name}: '{key}' is of the type {kind.str!r}; expected float32, '<f4'")
+    if 4 * math.prod(shape) != len(content) - file.tell():
         raise ValueError(f"'{key}' is shorter or longer than its shape")
-    order: Literal["F", "C"] = "F" if columns_first == b"True" else "C"
-    values, known = np.frombuffer(content, "<f4", offset=header.end()).reshape(shape, order=order), KEYS[key]
+    values, known = np.frombuffer(content, "<f4", offset=file.tell()), KEYS[key]
+    values = values.reshape(shape, order="F" if columns_first else "C")
     if not (np.isfinite(values).all() and known.low <= values.min(initial=known.low)):
         raise UserError(f"{name}: '{key}' has values that are not finite or below {known.low:g}")
     if values.max(initial=known.low) > known.high:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,9 +9,7 @@ from typing import Annotated, Any
 
 from annotated_types import Interval
 
-from ...core.errors import UserError
-from ...core.files import open_regular
-from .maps import inside
+from .maps import described, inside
 
 LARGEST = 100_000_000  # bytes of a file: all methods of this package on a panel of 1080 x 1920
 
@@ -41,11 +38,4 @@ class NetworkFile:
 
     def content(self, path: Path) -> bytes:
         """The file's bytes. UserError: it cannot be read, or is another than the profile says."""
-        try:
-            with open_regular(path, LARGEST) as file:
-                content = file.read(LARGEST + 1)
-        except OSError as error:
-            raise UserError(f"{path} cannot be read: {error.strerror}") from error
-        if len(content) != self.size or hashlib.sha256(content).hexdigest() != self.sha256:
-            raise UserError(f"{path}: is not the file that the profile describes, by its size or SHA-256")
-        return content
+        return described(path, LARGEST, self.size, self.sha256)

@@ -11,10 +11,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from ...core.compiled import usable
 from ...optics.blocks import in_blocks
+from ...optics.linear import linear
 from ...optics.phasor import phasor
 from .kernels import modulate_back_rows, modulate_rows
 from .path import Light
@@ -58,8 +58,9 @@ class PanelLight:
         """
         if not self.ready(phase.detach()):
             return self.in_torch(phase, gain)
-        light: Tensor = _Lit.apply(phase, self, gain)  # type: ignore[no-untyped-call]
-        return light
+        field = self.whole(phase.detach(), gain)
+        kept = field.detach()  # the field itself will hold what holds this
+        return linear(lambda _: field, lambda grad: self.back(grad, kept, phase, gain), phase)
 
     def in_torch(self, phase: Tensor, gain: float) -> Tensor:
         """``field`` by torch: the reference for compiled code, in its place where it cannot be."""
@@ -113,21 +114,6 @@ class PanelLight:
             shown = self.lut.phase(level, self.bits, level.new_ones(()), self.channel)
             (slope,) = torch.autograd.grad(shown.sum(), level)
         return shown.detach().numpy(), (slope * (2**self.bits / math.tau)).numpy()
-
-
-class _Lit(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, phase: Tensor, light: PanelLight, gain: float) -> Tensor:
-        field = light.whole(phase, gain)
-        ctx.light, ctx.gain = light, gain
-        ctx.save_for_backward(phase, field)
-        return field
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
-        phase, field = ctx.saved_tensors
-        return ctx.light.back(grad, field, phase, ctx.gain), None, None
 
 
 def _floats(field: Tensor) -> Floats:

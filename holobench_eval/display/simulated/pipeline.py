@@ -154,7 +154,7 @@ class SimulatedBench:
 
     def _path(self, profile: Profile, geometry: Geometry) -> LightPath:
         if geometry.image_pitch is not None:
-            return FourierPath.of(geometry, profile.propagation, self.image_samples).to(self.device)
+            return FourierPath(geometry, profile.propagation, self.image_samples, self.device, torch.complex64)
         noise = profile.coherent_noise
         plane, padded = noise.plane(geometry), self._padded()
         turning = 1.0 if plane is None else 1 - noise.plane_distance
@@ -258,11 +258,6 @@ class BenchSession:
     names: tuple[object, ...]
     exposure: tuple[float, ...]
     frames: int = 0
-
-    @property
-    def spec(self) -> DisplaySpec:
-        """Nominal optics, public."""
-        return self.bench.spec
 
     def announce(self, phases: Sequence[Tensor]) -> None:
         """Nothing: a simulated camera is always ready."""

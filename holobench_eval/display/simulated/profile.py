@@ -117,6 +117,20 @@ class Profile:
         """Names of the maps that its stages hold, of ``maps.KEYS``."""
         return [key for key in KEYS if (name := key.split("."))[1] in getattr(self, name[0]).maps]
 
+    def faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Keys whose values do not go together, and why; those of maps apart, which are read later."""
+        yield from ((("panel", key), fault) for key, fault in self.panel.faults())
+        yield from (*self.plane_faults(), *self.network_faults())
+        if fault := self.panel.fault_of(self.lut.table):
+            yield ("lut", "table"), fault
+        if self.lut.bend and self.lut.table:
+            yield ("lut", "bend"), "a table has no exponent to bend; give gamma in the place of the table"
+        if min(self.lut.gamma) < SMALLEST_GAMMA + STEEPEST * self.lut.bend:
+            yield ("lut", "bend"), f"{self.lut.bend:g} bends some exponents to zero"
+        spectra, colours = len(self.spectrum.measured), len(self.panel.wavelengths)
+        if spectra not in (0, colours):
+            yield ("spectrum", "measured"), f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
+
     def map_faults(self) -> Iterator[tuple[tuple[str, ...], str]]:
         """Keys that maps have taken the place of, and that are given nevertheless; a table for other levels."""
         for key in self.held:
@@ -237,7 +251,10 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
     text = "".join(each.text for each in documents)
     documents.reverse()  # a fault of a base is told of its own file
     merged = accumulate((each.data for each in documents), _over)
-    *_, profile = [_built(each, values) for each, values in zip(documents, merged, strict=True)]
+    for document, values in zip(documents, merged, strict=True):
+        profile = typed(document, Profile, values)
+        for where, fault in profile.faults():
+            raise document.error(where, fault)
     if profile.maps.file is not None:
         profile = _with_maps(profile, documents)
     if profile.network.method is not None:
@@ -249,26 +266,6 @@ def load_profile(name: str, folder: Path | None = None) -> Profile:
 def profile_files(name: str, folder: Path | None = None) -> list[Path]:
     """The files of a profile and of those it is like, its own first. UserError as ``load_profile``."""
     return [Path(document.name) for document in _documents(name, folder)]
-
-
-def _built(document: Document, values: Mapping[str, Any]) -> Profile:
-    """The profile of a file, with the values of those it is like. UserError: a fault, with file:line:column."""
-    profile = typed(document, Profile, values)
-    for key, fault in profile.panel.faults():
-        raise document.error(("panel", key), fault)
-    for where, fault in (*profile.plane_faults(), *profile.network_faults()):
-        raise document.error(where, fault)
-    if fault := profile.panel.fault_of(profile.lut.table):
-        raise document.error(("lut", "table"), fault)
-    if profile.lut.bend and profile.lut.table:
-        raise document.error(("lut", "bend"), "a table has no exponent to bend; give gamma in the place of the table")
-    if min(profile.lut.gamma) < SMALLEST_GAMMA + STEEPEST * profile.lut.bend:
-        raise document.error(("lut", "bend"), f"{profile.lut.bend:g} bends some exponents to zero")
-    spectra, colours = len(profile.spectrum.measured), len(profile.panel.wavelengths)
-    if spectra not in (0, colours):
-        message = f"there are {spectra} measured spectra; the panel has {colours} wavelengths"
-        raise document.error(("spectrum", "measured"), message)
-    return profile
 
 
 def _with_maps(profile: Profile, documents: Sequence[Document]) -> Profile:

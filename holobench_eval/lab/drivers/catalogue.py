@@ -18,13 +18,13 @@ from .worker import line
 MODULES = ("monitor", "gphoto2_camera", "micromanager_camera", "opencv_camera", "slmsuite_devices")
 
 
-def drivers_in(modules: Iterable[str], kind: Kind) -> dict[str, Driver[Any]]:
+def drivers_in(modules: Iterable[str], kind: Kind) -> dict[str, Driver]:
     """The drivers of a kind that modules of this package list, by their names."""
     listed = (driver for module in modules for driver in import_module(f"{__package__}.{module}").DRIVERS)
     return {driver.name: driver for driver in listed if driver.kind == kind}
 
 
-DRIVERS: Mapping[Kind, dict[str, Driver[Any]]] = {kind: drivers_in(MODULES, kind) for kind in get_args(Kind)}
+DRIVERS: Mapping[Kind, dict[str, Driver]] = {kind: drivers_in(MODULES, kind) for kind in get_args(Kind)}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def survey() -> list[Survey]:
     return [_survey(driver) for drivers in DRIVERS.values() for driver in drivers.values()]
 
 
-def _survey(driver: Driver[Any]) -> Survey:
+def _survey(driver: Driver) -> Survey:
     version = installed(driver.package)
     if version is None:
         remedy = installing(extra=driver.extra) if driver.extra else installing(driver.package)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
 from .worker import line
 
-Device = TypeVar("Device", covariant=True)
 T = TypeVar("T")
 Kind = Literal["slm", "camera"]
 
 
 @dataclass(frozen=True)
-class Driver(Generic[Device]):
+class Driver:
     """How devices of one kind are opened; every module that `catalogue` names lists its own as ``DRIVERS``.
 
     name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it;
@@ -32,7 +31,7 @@ class Driver(Generic[Device]):
     kind: Kind
     name: str
     settings: type[Any]
-    opens: Callable[[Any], Device]
+    opens: Callable[[Any], Any]
     package: str
     extra: str
     answering: Callable[[], list[str]]

@@ -103,7 +103,8 @@ class Gphoto2Camera:
         self.name = self._worker.name = f"{model} {serial}".strip()
 
         self._fix_exposure()
-        self._choose_raw()
+        if (config := next(filter(self._choices, FORMATS), None)) is not None:
+            self._choose(config, lambda word: bool(FULL_RAW.search(word)) and not LESS_THAN_RAW.search(word))
         with contextlib.suppress(UserError, DeviceError):  # else its card fills up
             self._choose("capturetarget", lambda choice: bool(re.search(r"ram", choice, re.IGNORECASE)))
 
@@ -119,11 +120,6 @@ class Gphoto2Camera:
         if not self._shutter:
             raise UserError(f"{self.name} does not let its shutter speed be set over USB; is its dial on M?")
         self._exact = exact(self._shutter)
-
-    def _choose_raw(self) -> None:
-        for config in FORMATS:
-            if self._choices(config):
-                return self._choose(config, lambda word: bool(FULL_RAW.search(word)) and not LESS_THAN_RAW.search(word))
 
     def _picture(self, shutter: float) -> tuple[RawFrame, float]:
         data = self._worker.call("taking a picture", CAPTURING + 3 * shutter, lambda: self._take(shutter))

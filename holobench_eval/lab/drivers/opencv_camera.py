@@ -7,7 +7,6 @@ That the counts that are left are linear is shown by the linearity gate, by noth
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -91,14 +90,12 @@ class OpencvCamera:
 
         settings = self._settings
         if self._capture is None:
-            backend = cv2.CAP_V4L2 if sys.platform.startswith("linux") else cv2.CAP_DSHOW
-            self._capture = cv2.VideoCapture(settings.device, backend)
+            self._capture = cv2.VideoCapture(settings.device, cv2.CAP_V4L2)
         if not self._capture.isOpened():
             raise UserError(f"{self.name} does not open; is it plugged in, and not in use?")
         self._name_format(cv2)
         # from the control that drives the others to those that it would drive
-        manual = 1.0 if sys.platform.startswith("linux") else 0.25  # V4L2's and DirectShow's word for it
-        self._switch("auto exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual, optional=False)
+        self._switch("auto exposure", cv2.CAP_PROP_AUTO_EXPOSURE, 1.0, optional=False)  # V4L2's word for manual
         self._switch("auto white balance", cv2.CAP_PROP_AUTO_WB, 0.0)
         self._switch("gain", cv2.CAP_PROP_GAIN, settings.gain)
         self._switch("gamma", cv2.CAP_PROP_GAMMA, settings.gamma)
@@ -137,9 +134,7 @@ class OpencvCamera:
         import cv2
 
         capture = self._capture
-        linux = sys.platform.startswith("linux")
-        # V4L2 counts in 100 us, DirectShow in whole stops
-        value = float(max(round(seconds * 1e4), 1)) if linux else float(round(math.log2(seconds)))
+        value = float(max(round(seconds * 1e4), 1))  # V4L2 counts in 100 us
         if not capture.set(cv2.CAP_PROP_EXPOSURE, value) or capture.get(cv2.CAP_PROP_EXPOSURE) != value:
             kept = capture.get(cv2.CAP_PROP_EXPOSURE)
             raise DeviceError(f"{self.name}: the exposure stays at {kept:g}, not {value:g}")
@@ -149,12 +144,11 @@ class OpencvCamera:
         if not good or frame is None:
             raise DeviceError(f"{self.name} gives no frame")
         columns, rows = self._settings.resolution
-        colour = self._settings.format == "YUYV"
-        if colour:
+        if self._settings.format == "YUYV":
             frame = frame[..., ::-1]
         elif frame.size == rows * columns:  # OpenCV gives what it does not convert with an axis too many, or as bytes
             frame = frame.reshape(rows, columns)
-        return np.ascontiguousarray(frame), value / 1e4 if linux else 2.0**value
+        return np.ascontiguousarray(frame), value / 1e4
 
 
 def list_cameras() -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
-import sys
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,8 @@ def grab(x: int, y: int, rows: int, columns: int) -> NDArray[np.uint8]:
     """
     from PIL import ImageGrab
 
-    box = (x, y, x + columns, y + rows)
     try:
-        if sys.platform == "win32":
-            picture = ImageGrab.grab(box, include_layered_windows=True, all_screens=True)
-        else:
-            picture = ImageGrab.grab(box, xdisplay=os.environ.get("DISPLAY", ""))
+        picture = ImageGrab.grab((x, y, x + columns, y + rows), xdisplay=os.environ.get("DISPLAY", ""))
         return np.asarray(picture.convert("RGB"))
     except Exception as error:
         raise DeviceError(
@@ -40,7 +35,7 @@ def gamma_is_straight(screen: Any) -> bool | None:
     A calibration loader or a night light bends this curve behind the back of every program.
     """
     try:
-        curve = _ramp_of_windows(screen) if sys.platform == "win32" else _ramp_of_x(screen)
+        curve = _ramp_of_x(screen)
     except (OSError, AttributeError, ValueError):  # no such library, no such function, no curve
         return None
     entries = np.linspace(0, curve.shape[1] - 1, 256).round().astype(int)
@@ -76,21 +71,3 @@ def _ramp_of_x(screen: Any) -> NDArray[np.uint16]:
         return np.stack(curves)
     finally:
         x11.XCloseDisplay(display)
-
-
-def _ramp_of_windows(screen: Any) -> NDArray[np.uint16]:
-    gdi: Any = ctypes.CDLL("gdi32")
-    gdi.CreateDCW.restype = ctypes.c_void_p
-    gdi.CreateDCW.argtypes = [ctypes.c_wchar_p, ctypes.c_wchar_p, ctypes.c_wchar_p, ctypes.c_void_p]
-    gdi.GetDeviceGammaRamp.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-    gdi.DeleteDC.argtypes = [ctypes.c_void_p]
-    context = gdi.CreateDCW("DISPLAY", screen.get_device_name(), None, None)
-    if not context:
-        raise OSError("no such monitor")
-    try:
-        curve = np.zeros((3, 256), np.uint16)
-        if not gdi.GetDeviceGammaRamp(context, curve.ctypes.data):
-            raise ValueError("no curve")
-        return curve
-    finally:
-        gdi.DeleteDC(context)

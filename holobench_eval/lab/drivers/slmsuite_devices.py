@@ -120,16 +120,11 @@ class SlmsuiteCamera:
 
 def classes(kind: Hardware) -> list[str]:
     """The modules of slmsuite that drive panels or cameras, sorted. UserError where it is not installed."""
-    package = _package(kind)
-    names = {module.name for module in pkgutil.iter_modules(package.__path__)}
-    return sorted(name for name in names if not name.startswith("_") and name not in ("camera", "slm", "template"))
-
-
-def _package(kind: Hardware) -> Any:
     package = import_package("slmsuite", f"slmsuite.hardware.{kind}", "slmsuite", "slmsuite")
     # as it comes, it writes to the standard output, where results go
     importlib.import_module("slmsuite").configure_logging(logging.WARNING, sys.stderr)
-    return package
+    names = {module.name for module in pkgutil.iter_modules(package.__path__)}
+    return sorted(name for name in names if not name.startswith("_") and name not in ("camera", "slm", "template"))
 
 
 def _opened(kind: Hardware, make: SlmsuiteSettings | Any) -> tuple[Worker, Any]:
@@ -172,7 +167,7 @@ def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
         raise UserError(f"device '{device}' cannot be built with these arguments: {line(error)}") from error
 
 
-def _driver(kind: Kind, hardware: Hardware, cls: type[Any], words: str, example: str) -> Driver[Any]:
+def _driver(kind: Kind, hardware: Hardware, cls: type[Any], words: str, example: str) -> Driver:
     why = f"slmsuite does not look for {words}: give the class of yours as device, such as {example}"
     return Driver(
         kind, "slmsuite", SlmsuiteSettings, cls, "slmsuite", "slmsuite", lambda: classes(hardware) and [], why

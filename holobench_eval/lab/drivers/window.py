@@ -56,7 +56,15 @@ class Window:
         self._window.push_handlers(on_key_press=lambda *_: True, on_close=lambda *_: True)
         self._window.set_mouse_visible(False)
         self._texture, self._source = self._gl.GLuint(), self._gl.GLuint()
-        self._prepare()
+        self._window.switch_to()
+        gl = self._gl
+        for feature in (gl.GL_DITHER, gl.GL_BLEND, gl.GL_FRAMEBUFFER_SRGB, gl.GL_SCISSOR_TEST, gl.GL_MULTISAMPLE):
+            gl.glDisable(feature)
+        gl.glGenTextures(1, self._texture)
+        gl.glGenFramebuffers(1, self._source)
+        gl.glBindTexture(gl.GL_TEXTURE_2D, self._texture)
+        for parameter in (gl.GL_TEXTURE_MIN_FILTER, gl.GL_TEXTURE_MAG_FILTER):
+            gl.glTexParameteri(gl.GL_TEXTURE_2D, parameter, gl.GL_NEAREST)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -98,17 +106,6 @@ class Window:
     def close(self) -> None:
         """Take the window away."""
         self._window.close()
-
-    def _prepare(self) -> None:
-        gl = self._gl
-        self._window.switch_to()
-        for feature in (gl.GL_DITHER, gl.GL_BLEND, gl.GL_FRAMEBUFFER_SRGB, gl.GL_SCISSOR_TEST, gl.GL_MULTISAMPLE):
-            gl.glDisable(feature)
-        gl.glGenTextures(1, self._texture)
-        gl.glGenFramebuffers(1, self._source)
-        gl.glBindTexture(gl.GL_TEXTURE_2D, self._texture)
-        for parameter in (gl.GL_TEXTURE_MIN_FILTER, gl.GL_TEXTURE_MAG_FILTER):
-            gl.glTexParameteri(gl.GL_TEXTURE_2D, parameter, gl.GL_NEAREST)
 
     def _blit(self, rows: int, columns: int) -> None:
         """Copy pixel to pixel, the first row to the top: no shader, no filter."""

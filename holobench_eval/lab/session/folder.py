@@ -200,20 +200,17 @@ class FolderPhotographer:
         showings = ordered(wanted, self.repeated, f"{self.manifest.session} {number}", exposures, dark)
         patterns: list[Pattern] = []
         for showing in showings:
-            patterns += self._written(showing, number, len(patterns))
+            request, place = showing.request, (number, len(patterns))
+            exposure = showing.exposure if request is None else self._exposure(request)
+            counted = digest([showing.role, number, showing.copy, showing.exposure])
+            key = self._key(request) if request and showing.role != REPEAT else counted
+            target = digest(request.target) if request and request.target else ""
+            levels = None if request is None else self.manifest.phase.levels(request.phase)
+            patterns += self._shown(showing.role, levels, exposure, key, target, place)
         self._finish(patterns, _readme(number, len(patterns)))
         self._known |= {(pattern.key, pattern.colour): pattern for pattern in patterns}
         self.wanted.clear()
         return patterns
-
-    def _written(self, showing: Showing, round_: int, before: int) -> list[Pattern]:
-        request, phase = showing.request, self.manifest.phase
-        exposure = showing.exposure if request is None else self._exposure(request)
-        counted = digest([showing.role, round_, showing.copy, showing.exposure])
-        key = self._key(request) if request and showing.role != REPEAT else counted
-        target = digest(request.target) if request and request.target else ""
-        levels = None if request is None else phase.levels(request.phase)
-        return self._shown(showing.role, levels, exposure, key, target, (round_, before))
 
     def _shown(
         self, role: str, levels: Levels | None, exposure: float, key: str, target: str, place: tuple[int, int]

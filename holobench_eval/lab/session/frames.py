@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from ...core.errors import UserError
-from ...core.files import read_regular
+from ...core.io import read_regular
 from ...optics.colour import srgb_decode
 from ..counts import read_counts, step
 from .manifest import SUFFIXES, inside

@@ -16,8 +16,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, Len, MaxLen, MinLen
 
 from ...core.errors import CellError, UserError
-from ...core.files import read_text
-from ...core.io import write_atomically
+from ...core.io import read_text, write_atomically
 from ...core.schema import FieldError, checked
 from ...imaging.convention import Convention
 from ...methods.files.correction import on_panel

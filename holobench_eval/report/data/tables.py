@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.errors import UserError
-from ...core.files import CONTROLS, read_text
+from ...core.io import CONTROLS, read_text
 from ...study.plan import FLOORS, Plan, is_reference
 from . import columns
 from .column import DONE as DONE

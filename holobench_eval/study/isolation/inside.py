@@ -33,7 +33,7 @@ from ...core.errors import CellError, UserError
 from ...core.parameters import words
 from ...core.reads import PACKAGE, recorded
 from ...core.schema import FieldError
-from ...display.api import from_numpy
+from ...display.phases import from_numpy
 from ...display.traits import FLAGS, traits_of
 from . import namespace
 from .handles import SolvingHandle, TrainingHandle

@@ -18,8 +18,9 @@ import torch
 from torch import Tensor
 
 from ...core.errors import CellError
-from ...display.api import Capture, DisplaySpec, Region, is_plain, type_name
+from ...display.api import Capture, DisplaySpec, Region
 from ...display.estimates import Estimate
+from ...display.phases import is_plain, type_name
 from ...display.training import TrainingImage
 
 LONGEST_HEADER, LARGEST_TENSOR = 64 * 2**20, 8 * 2**30  # bytes that are read

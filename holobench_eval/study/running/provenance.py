@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import UserError
-from ...core.files import read_text
 from ...core.installed import __version__, installed
-from ...core.io import now, write_atomically
+from ...core.io import now, read_text, write_atomically
 from .. import isolation
 from ..changes import noted
 from ..cost import cpu_model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from ...display.api import ideal_image
+from ...display.nominal import ideal_image
 from ...metrics import error_budget as budget
 from .job import Job, Measured
 from .picture import refuse_saturated

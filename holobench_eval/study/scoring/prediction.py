@@ -13,7 +13,7 @@ from ...core.device import moved
 from ...core.errors import CellError, Pending
 from ...core.hashing import digest
 from ...display import RectifiedCapture
-from ...display.api import from_numpy, is_plain
+from ...display.phases import from_numpy, is_plain
 from ...metrics import control, match
 from .. import cost, isolation, opening
 from ..artifacts import Artifact

@@ -12,8 +12,7 @@ from torch import Tensor
 from ...core.device import moved
 from ...core.errors import BudgetError, CellError
 from ...display import MeteredDisplay
-from ...display.api import from_numpy, is_plain, type_name
-from ...display.phases import single
+from ...display.phases import from_numpy, is_plain, single, type_name
 from .. import cost, identity, isolation
 from ..displays import Condition
 from ..phases import Solution, Starts

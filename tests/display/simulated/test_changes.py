@@ -11,7 +11,7 @@ from holobench_eval.core.plugins import build
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import KINDS, altered, checked
 from holobench_eval.display.simulated.changes.camera import SENSORS
-from holobench_eval.display.simulated.changes.kind import Kind, number
+from holobench_eval.display.simulated.changes.kind import Kind
 from holobench_eval.display.simulated.changes.vision import EYEPIECE, Prescription
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import score
@@ -161,7 +161,7 @@ def test_a_kind_and_a_row_make_a_change_that_a_study_can_sweep(tmp_path, monkeyp
     def flicker(profile, added):
         return replace(profile, flicker=replace(profile.flicker, rms=profile.flicker.rms + added))
 
-    kind = Kind("flicker of the panel", "of the stroke", ("flicker",), number(flicker), "added", low=0, high=0.1)
+    kind = Kind("flicker of the panel", "of the stroke", ("flicker",), flicker, "added", low=0, high=0.1)
     monkeypatch.setitem(KINDS, "flicker", kind)
     (tmp_path / "study.yaml").write_text(
         "title: A year\ndisplay: {profiles: [leto-mild], panel: [192, 192]}\ntargets: {dataset: charts}\n"

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from holobench_eval.core.device import CPU
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import altered
@@ -53,8 +54,7 @@ def test_an_ideal_bench_shows_what_methods_are_told(channel, sampling):
 def test_the_adjoint_passes_the_dot_product_test_and_is_the_gradient():
     torch.manual_seed(0)
     geometry = Geometry((7, 10), 8e-6, 532e-9, 0.2, 3, 0, ("test",), image_pitch=1e-3)
-    path = FourierPath.of(geometry, Propagation(wavelength_error=0.01), finer=2)
-    path = replace(path, rows=path.rows.to(torch.complex128), columns=path.columns.to(torch.complex128))
+    path = FourierPath(geometry, Propagation(wavelength_error=0.01), 2, CPU, torch.complex128)
     field = torch.randn(3, 3, 7, 10, dtype=torch.complex128).requires_grad_()
     light = torch.randn(14, 20, dtype=torch.complex128)
     assert torch.allclose((light.conj() * path.forward(field)).sum(), (path.adjoint(light).conj() * field).sum())

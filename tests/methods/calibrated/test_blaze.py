@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import ideal_image
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.stages import Crosstalk, LookUpTable
 from holobench_eval.methods.calibrated.display_model import KNOTS, DisplayModel

@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.display.api import Capture, ideal_image
+from holobench_eval.display.api import Capture
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel

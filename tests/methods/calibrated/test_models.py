@@ -9,7 +9,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval.display.api import DisplaySpec, ideal_image, white_irradiance
+from holobench_eval.display.api import DisplaySpec, white_irradiance
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.methods.calibrated.approximator import ModelApproximator
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel

@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import BudgetError
-from holobench_eval.display.api import Capture, ideal_image
+from holobench_eval.display.api import Capture
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated.phase_gamma import WirtingerGamma, curved
 from holobench_eval.methods.wirtinger import Wirtinger

@@ -11,7 +11,7 @@ import torch
 
 from holobench_eval.datasets.photographs import Photographs
 from holobench_eval.display import DisplaySpec, load_profile
-from holobench_eval.display.api import ideal_image, nominal_levels
+from holobench_eval.display.nominal import ideal_image, nominal_levels
 from holobench_eval.methods.coarse.gumbel import Gumbel, gumbel_noise
 from holobench_eval.methods.coarse.nearest_level import NearestLevel
 from holobench_eval.methods.coarse.straight_through import StraightThrough

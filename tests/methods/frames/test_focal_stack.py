@@ -9,7 +9,7 @@ from torch import Tensor
 
 from holobench_eval.datasets.focal_stacks import FocalStacks
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import ideal_light
+from holobench_eval.display.nominal import ideal_light
 from holobench_eval.methods.common import matched
 from holobench_eval.methods.frames.focal_stack import FocalStack
 from holobench_eval.methods.frames.random_frames import RandomFrames

@@ -12,7 +12,7 @@ from torch import Tensor
 from holobench_eval.core.errors import UserError
 from holobench_eval.datasets.photographs import Photographs
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import ideal_light
+from holobench_eval.display.nominal import ideal_light
 from holobench_eval.methods.coarse.levels import Levels
 from holobench_eval.methods.common import matched, unit_field
 from holobench_eval.methods.frames.random_frames import RandomFrames

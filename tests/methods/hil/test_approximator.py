@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.display.api import DisplaySpec, ideal_image, white_irradiance
+from holobench_eval.display.api import DisplaySpec, white_irradiance
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.methods.hil.approximator import NetworkApproximator
 from holobench_eval.methods.hil.approximator_loss import ApproximatorLoss
 from holobench_eval.methods.hil.critic import Critic

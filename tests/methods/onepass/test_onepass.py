@@ -10,7 +10,8 @@ import pytest
 import torch
 
 from holobench_eval.core import plugins
-from holobench_eval.display.api import DisplaySpec, ideal_image
+from holobench_eval.display.api import DisplaySpec
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.double_phase import AntiAliasedDoublePhase, DoublePhase
 from holobench_eval.methods.learned.fidelity import matched_psnr

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from holobench_eval.display import load_profile
-from holobench_eval.display.api import ideal_image
+from holobench_eval.display.nominal import ideal_image
 from holobench_eval.display.simulated.stages import StrayLight
 from holobench_eval.display.training import TrainingBench, TrainingImage
 from holobench_eval.methods.calibrated import patterns

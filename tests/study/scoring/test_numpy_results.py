@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from holobench_eval.display.api import from_numpy
+from holobench_eval.display.phases import from_numpy
 from tests.study.studies import write_study
 from tests.support.trained_study import compute
 

@@ -29,18 +29,9 @@ pixels hold more, a CCD has more read noise and the response of its amplifier.""
 SENSOR_MODEL = "pitch and bits as published; well, noise and response assumed"
 
 
-def moved_sideways(profile: Profile, millimetres: float) -> Profile:
-    """The bench seen by a camera that was moved to the right."""
-    return _moved(profile, 0.0, millimetres / FAR)
-
-
-def moved_up(profile: Profile, millimetres: float) -> Profile:
-    """The bench seen by a camera that was moved up."""
-    return _moved(profile, -millimetres / FAR, 0.0)
-
-
-def _moved(profile: Profile, down: float, right: float) -> Profile:
-    """down, right: the shift relative to ``FAR``."""
+def moved(profile: Profile, down: float, right: float) -> Profile:
+    """The bench seen by a camera that was moved so far [mm]."""
+    down, right = down / FAR, right / FAR
     squared = down * down + right * right
     way, relay, sensor = profile.propagation, profile.relay, profile.sensor
     added = {"coma_y": COMA * down, "coma_x": COMA * right, "astigmatism_0": ASTIGMATISM * (right**2 - down**2)}

@@ -28,7 +28,7 @@ class Kind:
     words: str
     unit: str
     stages: tuple[str, ...]
-    apply: Callable[[Profile, Value], Profile]
+    apply: Callable[[Profile, Any], Profile]
     model: str
     nominal: float | None = 0.0
     low: float = -math.inf
@@ -44,11 +44,13 @@ class Kind:
         return self.nominal is not None
 
 
-def number(change: Callable[[Profile, float], Profile]) -> Callable[[Profile, Value], Profile]:
-    """A change by a number, which is not asked for names."""
-    return lambda profile, value: change(profile, float(value))
-
-
 def within(profile: Profile, stage: str, **values: Any) -> Profile:
     """The profile with other values of a stage, by its key in a profile, or of its panel."""
     return replace(profile, **{stage: replace(getattr(profile, stage), **values)})
+
+
+def added(stage: str, key: str, amount: Callable[[float], float] = float) -> Callable[[Profile, float], Profile]:
+    """A change that adds an amount, given by its number, to a value of a stage."""
+    return lambda profile, number: within(
+        profile, stage, **{key: getattr(getattr(profile, stage), key) + amount(number)}
+    )

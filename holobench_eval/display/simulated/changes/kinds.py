@@ -15,7 +15,7 @@ from ....core.errors import UserError, suggest
 from ..profile import Profile
 from ..stages import AddedLens, Eye
 from . import camera, draws, vision
-from .kind import Kind, Value, number, within
+from .kind import Kind, Value, added, within
 
 USUAL_BITS = 8  # of the panels that a bit-depth sweep starts from
 GREEN = 517e-9  # wavelength [m] that a drift of the lasers is given at
@@ -26,30 +26,7 @@ CLEARING, OPERATING, HALLER = 373.0, 308.0, 0.2
 Haller's law, birefringence ~ (1 - T / T_clearing)^0.2 (Haller, Progress in Solid State Chemistry 10, 103, 1975)."""
 
 
-def _drift(profile: Profile, days: float) -> Profile:
-    return within(profile, "drift", days=profile.drift.days + days)
-
-
-def _distance(profile: Profile, percent: float) -> Profile:
-    return within(profile, "propagation", distance_error=profile.propagation.distance_error + percent / 100)
-
-
-def _wavelength(profile: Profile, nanometres: float) -> Profile:
-    moved = profile.propagation.wavelength_error + nanometres * 1e-9 / GREEN
-    return within(profile, "propagation", wavelength_error=moved)
-
-
-def _defocus(profile: Profile, waves: float) -> Profile:
-    before = profile.propagation.aberration
-    return within(profile, "propagation", aberration={**before, "defocus": before.get("defocus", 0.0) + waves})
-
-
-def _obstruction(profile: Profile, radius: float) -> Profile:
-    return within(profile, "propagation", obstruction=max(profile.propagation.obstruction, radius))
-
-
-def _power(profile: Profile, factor: float) -> Profile:
-    return within(profile, "illumination", power=profile.illumination.power * factor)
+_distance = added("propagation", "distance_error", lambda percent: percent / 100)
 
 
 def _temperature(profile: Profile, kelvin: float) -> Profile:
@@ -68,12 +45,13 @@ def _bits(profile: Profile, bits: float) -> Profile:
     return within(profile, "panel", bits=int(bits))
 
 
-def _sibling(profile: Profile, value: Value) -> Profile:
-    return replace(profile, seed=profile.seed + int(value))
+def _defocus(profile: Profile, waves: float) -> Profile:
+    before = profile.propagation.aberration
+    return within(profile, "propagation", aberration={**before, "defocus": before.get("defocus", 0.0) + waves})
 
 
-def _ambient(profile: Profile, level: float) -> Profile:
-    return within(profile, "sensor", ambient=profile.sensor.ambient + level)
+def _obstruction(profile: Profile, radius: float) -> Profile:
+    return within(profile, "propagation", obstruction=max(profile.propagation.obstruction, radius))
 
 
 def _refocus(profile: Profile, millimetres: float) -> Profile:
@@ -81,21 +59,14 @@ def _refocus(profile: Profile, millimetres: float) -> Profile:
     return replace(_distance(profile, 100 * moved), lens=AddedLens((moved, moved, 0.0)))
 
 
-def _other_plane(profile: Profile, millimetres: float) -> Profile:
-    return _distance(profile, 100 * millimetres * 1e-3 / profile.panel.distance)
+def _corrected_eye(profile: Profile, text: str) -> Profile:
+    moved = vision.relative(profile, text)
+    return replace(profile, eye=Eye(moved), lens=AddedLens(moved))
 
 
-def _eye(profile: Profile, value: Value) -> Profile:
-    return replace(profile, eye=Eye(vision.relative(profile, str(value))))
-
-
-def _corrected_eye(profile: Profile, value: Value) -> Profile:
-    return replace(_eye(profile, value), lens=AddedLens(vision.relative(profile, str(value))))
-
-
-def _eye_pupil(profile: Profile, value: Value) -> Profile:
+def _eye_pupil(profile: Profile, place: str) -> Profile:
     band = profile.panel.pupil or 1.0
-    return replace(profile, eye=Eye(pupil=PUPIL * band, decentre=(0.0, float(value) * band)))
+    return replace(profile, eye=Eye(pupil=PUPIL * band, decentre=(0.0, float(place) * band)))
 
 
 def _place(text: str) -> str:
@@ -109,83 +80,80 @@ def _place(text: str) -> str:
     return f"{place:g}"
 
 
-def _known_eye(profile: Profile, value: Value) -> Profile:
-    return replace(profile, eye=Eye(vision.relative(profile, str(value)), known=True))
-
-
-def _draw(profile: Profile, value: Value) -> Profile:
-    return draws.drawn(profile, int(value))
-
-
 KINDS: Mapping[str, Kind] = {
     "camera_shift_x": Kind(
-        "camera moved sideways", "mm", camera.STAGES, number(camera.moved_sideways), camera.MODEL,
-        low=-40, high=40, moves=True,
+        "camera moved sideways", "mm", camera.STAGES,
+        lambda profile, right: camera.moved(profile, 0.0, right), camera.MODEL, low=-40, high=40, moves=True,
     ),
     "camera_shift_y": Kind(
-        "camera moved up or down", "mm", camera.STAGES, number(camera.moved_up), camera.MODEL,
-        low=-40, high=40, moves=True,
+        "camera moved up or down", "mm", camera.STAGES,
+        lambda profile, up: camera.moved(profile, -up, 0.0), camera.MODEL, low=-40, high=40, moves=True,
     ),
     "drift": Kind(
-        "drift since calibration", "days", ("drift",), number(_drift),
+        "drift since calibration", "days", ("drift",), added("drift", "days"),
         "seeded walks of laser power, tilt of the beam, stroke of the panel and pose at the profile's daily rates, and "
         "dust that settles at the rate at which the profile's came in a year (assumed)",
         low=0, high=3650, moves=True,
     ),
     "sensor": Kind(
-        "another camera", "", ("sensor",), lambda profile, value: camera.swapped(profile, str(value)),
-        camera.SENSOR_MODEL, nominal=None, moves=True, names=" or ".join(camera.SENSORS),
+        "another camera", "", ("sensor",), camera.swapped, camera.SENSOR_MODEL,
+        nominal=None, moves=True, names=" or ".join(camera.SENSORS),
     ),
     "distance": Kind(
-        "error of the propagation distance", "%", ("propagation",), number(_distance),
+        "error of the propagation distance", "%", ("propagation",), _distance,
         "added to the profile's error", low=-20, high=20,
     ),
     "wavelength": Kind(
-        "drift of the lasers' wavelength", "nm", ("propagation",), number(_wavelength),
+        "drift of the lasers' wavelength", "nm", ("propagation",),
+        added("propagation", "wavelength_error", lambda nanometres: nanometres * 1e-9 / GREEN),
         "at 517 nm, the other lasers by the same share; added to the profile's error", low=-20, high=20,
     ),
     "defocus": Kind(
-        "defocus", "waves rms", ("propagation",), number(_defocus),
+        "defocus", "waves rms", ("propagation",), _defocus,
         "Zernike defocus at 517 nm over the iris, added to the profile's", low=-10, high=10,
     ),
     "laser_power": Kind(
-        "laser power", "of the nominal", ("illumination",), number(_power),
+        "laser power", "of the nominal", ("illumination",),
+        lambda profile, factor: within(profile, "illumination", power=profile.illumination.power * factor),
         "the exposure stays, so that less light is noisier and more may saturate", nominal=1.0, low=0.01, high=20,
     ),
     "temperature": Kind(
-        "panel temperature above that of calibration", "K", ("lut",), number(_temperature),
+        "panel temperature above that of calibration", "K", ("lut",), _temperature,
         "the stroke follows the birefringence by Haller's law, clearing point 100 C, panel at 35 C (assumed)",
         low=-30, high=50,
     ),
     "obstruction": Kind(
-        "disc in the middle of the pupil", "of its radius", ("propagation",), number(_obstruction),
+        "disc in the middle of the pupil", "of its radius", ("propagation",), _obstruction,
         "opaque, with the soft edge of the iris", low=0, high=0.95,
     ),
     "bits": Kind(
-        "bit depth of the panel", "bits", ("panel",), number(_bits),
+        "bit depth of the panel", "bits", ("panel",), _bits,
         "the same look-up table at fewer levels", nominal=float(USUAL_BITS), low=1, high=USUAL_BITS,
     ),
     "sibling": Kind(
-        "another panel of the same kind", "", ("seed",), _sibling,
+        "another panel of the same kind", "", ("seed",),
+        lambda profile, index: replace(profile, seed=profile.seed + int(index)),
         "same profile, every random pattern drawn anew", nominal=None, moves=True, counted=True,
     ),
     "ambient": Kind(
-        "ambient light", "of a white pixel", ("sensor",), number(_ambient),
+        "ambient light", "of a white pixel", ("sensor",), added("sensor", "ambient"),
         "even over the sensor, and not in the dark frame", low=0, high=10,
     ),
     "refocus": Kind(
-        "image moved by a lens phase, camera at its new place", "mm", ("lens", "propagation"), number(_refocus),
+        "image moved by a lens phase, camera at its new place", "mm", ("lens", "propagation"), _refocus,
         "paper 7.1: a lens added to the same hologram; on a smaller panel the way shrinks with the distance. What it "
         "loses: the lens tilts light towards the panel's edge, where the iris cuts another part of its band, and adds "
         "wraps, which a panel with crosstalk blurs",
         low=-50, high=50, moves=True,
     ),
     "other_plane": Kind(
-        "camera out of the image plane", "mm", ("propagation",), number(_other_plane),
+        "camera out of the image plane", "mm", ("propagation",),
+        lambda profile, millimetres: _distance(profile, 100 * millimetres * 1e-3 / profile.panel.distance),
         "as refocus, without the lens", low=-50, high=50,
     ),
     "eye": Kind(
-        "eye that needs glasses", "", ("eye",), _eye,
+        "eye that needs glasses", "", ("eye",),
+        lambda profile, text: replace(profile, eye=Eye(vision.relative(profile, text))),
         f"relaxed, behind an eyepiece of {1e3 * vision.EYEPIECE:g} mm (assumed); sphere / cylinder x axis in dioptres "
         "and degrees",
         nominal=None, read=vision.one_form, names=vision.NAMES,
@@ -196,7 +164,8 @@ KINDS: Mapping[str, Kind] = {
         nominal=None, read=vision.one_form, names=vision.NAMES, moves=True,
     ),
     "known_eye": Kind(
-        "the same eye, known to the methods", "", ("eye",), _known_eye,
+        "the same eye, known to the methods", "", ("eye",),
+        lambda profile, text: replace(profile, eye=Eye(vision.relative(profile, text), known=True)),
         "the eye is part of the nominal optics that holograms are computed for",
         nominal=None, read=vision.one_form, names=vision.NAMES,
     ),
@@ -207,8 +176,8 @@ KINDS: Mapping[str, Kind] = {
         nominal=None, read=_place, names=PLACES,
     ),
     "draw": Kind(
-        "random draw of the bench's parameters", "", draws.STAGES, _draw, draws.MODEL, nominal=None, moves=True,
-        counted=True,
+        "random draw of the bench's parameters", "", draws.STAGES,
+        lambda profile, index: draws.drawn(profile, int(index)), draws.MODEL, nominal=None, moves=True, counted=True,
     ),
 }  # fmt: skip
 """Every kind of condition by its name in a config."""

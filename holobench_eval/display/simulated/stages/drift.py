@@ -50,7 +50,10 @@ class Drift(Stage):
     def moved(self, profile: Profile, geometry: Geometry) -> Profile:
         """A profile with the tilt of the beam and the pose of the camera of today."""
         light, relay = profile.illumination, profile.relay
-        tilt, shift = self.added_tilt(geometry), self.added_shift(geometry)
+        tilt, shift = (
+            [rate * self.walk(geometry, f"{name} {axis}") for axis in "yx"]
+            for name, rate in (("tilt", self.tilt), ("pose", self.pose))
+        )
         return replace(
             profile,
             illumination=replace(light, tilt=(light.tilt[0] + tilt[0], light.tilt[1] + tilt[1])),
@@ -72,16 +75,8 @@ class Drift(Stage):
         """Relative phase gain of the panel today."""
         return math.exp(self.gain * self.walk(geometry, "gain"))
 
-    def added_tilt(self, geometry: Geometry) -> tuple[float, float]:
-        """Tilt of the beam today [cycles per panel height]."""
-        return self.tilt * self.walk(geometry, "tilt y"), self.tilt * self.walk(geometry, "tilt x")
-
     def dust(self, geometry: Geometry, noise: CoherentNoise) -> Tensor:
         """Amplitude ``(H, W)`` behind the dust that has settled on the panel since calibration."""
         settled = math.floor(self.days * noise.specks / GATHERED)
         draw = geometry.generator("drift", "dust")
         return noise.shade(geometry, torch.rand(LONGEST, 4, generator=draw, dtype=torch.float64)[:settled])
-
-    def added_shift(self, geometry: Geometry) -> tuple[float, float]:
-        """Shift of the image on the sensor today [panel heights]."""
-        return self.pose * self.walk(geometry, "pose y"), self.pose * self.walk(geometry, "pose x")
