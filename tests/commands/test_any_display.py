@@ -67,9 +67,7 @@ def arguments(words: tuple[str, ...], function: Any, folder: Path, panel: list[i
 
 @pytest.mark.usefixtures("in_process", "stage_sheets")
 @pytest.mark.parametrize("display", DISPLAYS, ids=lambda each: f"{len(each[0])} x {each[1]} bits, {each[2]}")
-def test_every_command_that_takes_a_display_works_on_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, display: tuple[list[float], int, list[int]]
-) -> None:
+def test_every_command_that_takes_a_display_works_on_it(tmp_path, monkeypatch, display):
     monkeypatch.chdir(tmp_path)
     wavelengths, bits, shape = display
     Path("mine.yaml").write_text(PROFILE.format(wavelengths=wavelengths, bits=bits, shape=shape))
@@ -88,5 +86,5 @@ def test_every_command_that_takes_a_display_works_on_it(
     assert {path.parts[0] for path in Path().glob("**/figures/*stages*.png")} == {"solved", "holoeval-results"}
 
 
-def test_the_commands_are_all_that_take_a_display() -> None:
+def test_the_commands_are_all_that_take_a_display():
     assert {"show", "solve", "plan", "run", "list", "session export"} <= {" ".join(words) for words, _ in COMMANDS}

@@ -1,14 +1,10 @@
 """The command prints what was fitted, what it gives and what was wanted."""
 
-import pytest
-
 from holobench_eval.commands.own.calibrate import calibrate
 from holobench_eval.study.calibration.fitting import Fitting
 
 
-def test_figures_and_values_are_printed_beside_what_was_wanted(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_figures_and_values_are_printed_beside_what_was_wanted(monkeypatch, capsys):
     monkeypatch.setattr(Fitting, "fit", lambda _: ({"stray_light.share": 0.512}, 25.04))
     monkeypatch.setattr(Fitting, "captured", lambda _, values: {"double_phase": 15.3, "wirtinger": 17.5})
     calibrate("leto-hazy")

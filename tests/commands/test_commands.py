@@ -40,7 +40,7 @@ methods: [double_phase, "blind.py:Blind"]
 
 
 @pytest.fixture
-def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def config(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "blind.py").write_text(PLUGIN)
@@ -59,7 +59,7 @@ def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 @pytest.mark.parametrize("by", ["numpy", "torch"])
-def test_memory_that_is_used_up_is_one_line(monkeypatch: pytest.MonkeyPatch, call: Call, by: str) -> None:
+def test_memory_that_is_used_up_is_one_line(monkeypatch, call, by):
     def full() -> None:
         np.empty(2**60, np.uint8) if by == "numpy" else torch.empty(2**60, dtype=torch.uint8)
 
@@ -68,9 +68,7 @@ def test_memory_that_is_used_up_is_one_line(monkeypatch: pytest.MonkeyPatch, cal
     assert call("list") == (2, "", line)
 
 
-def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call
-) -> None:
+def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(tmp_path, monkeypatch, call):
     def is_said(method: str) -> bool:
         code, printed, _ = call("plan", "table3", "--methods", method)
         assert code == 0
@@ -84,7 +82,7 @@ def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(
 
 
 @pytest.mark.slow
-def test_a_study_from_run_to_check(config: Path, call: Call) -> None:
+def test_a_study_from_run_to_check(config, call):
     code, printed, _ = call("plan", config)
     assert code == 0
     assert not Path("holoeval-results").exists()
@@ -135,9 +133,7 @@ def test_a_study_from_run_to_check(config: Path, call: Call) -> None:
         (("check", "nowhere"), "no report, and none in its folders"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(
-    config: Path, call: Call, arguments: tuple[str, ...], message: str
-) -> None:
+def test_bad_input_is_one_line_and_exit_code_2(config, call, arguments, message):
     code, out, err = call(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("holoeval: ")
@@ -155,9 +151,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
         (OSError("a driver's own"), "a driver's own"),
     ],
 )
-def test_a_refusal_of_the_system_begins_with_the_place(
-    monkeypatch: pytest.MonkeyPatch, call: Call, error: OSError, line: str
-) -> None:
+def test_a_refusal_of_the_system_begins_with_the_place(monkeypatch, call, error, line):
     def refused() -> None:
         raise error
 
@@ -165,7 +159,7 @@ def test_a_refusal_of_the_system_begins_with_the_place(
     assert call("list") == (2, "", f"holoeval: {line}\n")
 
 
-def test_a_mistake_in_a_config_leaves_nothing_behind(config: Path, call: Call) -> None:
+def test_a_mistake_in_a_config_leaves_nothing_behind(config, call):
     config.write_text(CONFIG.replace("panel", "pannel"))
     code, _, error = call("run", config)
     assert code == 2
@@ -174,18 +168,18 @@ def test_a_mistake_in_a_config_leaves_nothing_behind(config: Path, call: Call) -
 
 
 @pytest.mark.parametrize("option", ["--threads", "--workers"])
-def test_no_workers_and_no_threads_are_refused(config: Path, call: Call, option: str) -> None:
+def test_no_workers_and_no_threads_are_refused(config, call, option):
     assert call("run", config, "--executor", "local", option, "0")[0] == 2
 
 
-def test_a_new_method_is_written_and_named(config: Path, call: Call) -> None:
+def test_a_new_method_is_written_and_named(config, call):
     code, printed, _ = call("new-method", "quiet_phase", "--folder", "mine")
     assert code == 0
     assert "mine/quiet_phase.py:QuietPhase" in printed
     assert call("new-method", "quiet_phase", "--folder", "mine")[0] == 2
 
 
-def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
+def test_a_new_command_is_one_file_and_one_line(tmp_path):
     package = tmp_path / "holobench_eval"
     shutil.copytree(Path(commands.__file__).parents[1], package, ignore=shutil.ignore_patterns("__pycache__"))
     folder = package / "commands"
@@ -206,7 +200,7 @@ def test_a_new_command_is_one_file_and_one_line(tmp_path: Path) -> None:
     assert output("greet-all") == "hello\n"
 
 
-def test_the_help_lists_commands_in_the_order_of_work_a_line_each(monkeypatch: pytest.MonkeyPatch, call: Call) -> None:
+def test_the_help_lists_commands_in_the_order_of_work_a_line_each(monkeypatch, call):
     monkeypatch.setenv("COLUMNS", "80")
     code, printed, _ = call("-h")
     assert code == 0
@@ -225,27 +219,25 @@ def every_command() -> list[str]:
 
 
 @pytest.mark.parametrize("command", [*every_command(), "session export"])
-def test_every_command_explains_itself(call: Call, command: str) -> None:
+def test_every_command_explains_itself(call, command):
     code, printed, _ = call(*command.split(), "-h")
     assert code == 0
     assert f"Usage: holoeval {command}" in printed
 
 
 @pytest.mark.parametrize("arguments", [(), ("run",), ("session", "export")])
-def test_the_version_is_that_of_the_package(call: Call, arguments: tuple[str, ...]) -> None:
+def test_the_version_is_that_of_the_package(call, arguments):
     assert call(*arguments, "--version")[:2] == (0, f"holoeval {version('holobench_eval')}\n")
 
 
-def test_help_needs_no_heavy_import() -> None:
+def test_help_needs_no_heavy_import():
     code = "import sys, holobench_eval.commands\n"
     code += "print(sorted({'torch', 'numpy', 'pydantic', 'dask'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
-def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks(
-    config: Path, monkeypatch: pytest.MonkeyPatch, call: Call
-) -> None:
+def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks(config, monkeypatch, call):
     monkeypatch.setattr(sheet, "draw_sheet", lambda *_: Path("stages.png"))
     code, table, _ = call("show", "leto-dusty")
     assert code == 0
@@ -254,7 +246,7 @@ def test_a_display_is_shown_with_its_effects_and_what_the_parametric_model_lacks
     assert "lacks it" in shown["plane_dust"]
 
 
-def test_signs_that_a_terminal_lacks_stop_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_signs_that_a_terminal_lacks_stop_nothing(monkeypatch, tmp_path):
     narrow = TextIOWrapper(BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stderr", narrow)
     assert holoeval(monkeypatch, "run", str(tmp_path / "Ω·.yaml")) == 2

@@ -69,14 +69,14 @@ def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
     return new / "session"
 
 
-def test_a_session_with_its_bench_file_imports_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_session_with_its_bench_file_imports_anywhere(tmp_path, monkeypatch):
     session = moved(tmp_path, monkeypatch, STUDY)
     assert "table.csv" in succeed("session", "import", session)
 
 
 def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_holograms_are_those_of_the_export(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     session = moved(tmp_path, monkeypatch, OWN)
     _, failure = run("session", "import", session)
     for missing in ("path: images", "own.py:Elsewhere", "dataset: folder", "give --study"):

@@ -25,7 +25,7 @@ def _can_be_alone() -> bool:
 
 
 @pytest.mark.skipif(not _can_be_alone(), reason="the system gives no namespace of the network")
-def test_a_study_is_run_and_reported_without_a_network(tmp_path: Path) -> None:
+def test_a_study_is_run_and_reported_without_a_network(tmp_path):
     (tmp_path / "study.yaml").write_text(CONFIG)
     command = [str(Path(sys.executable).with_name("holoeval")), "run", "study.yaml", "--workers", "2"]
     done = subprocess.run([*ALONE, *command], cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ))

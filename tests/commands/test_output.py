@@ -19,7 +19,7 @@ LONG = "a method whose label is as long as a label may ever be, sixty"
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+def records(tmp_path_factory):
     return study(tmp_path_factory.mktemp("study"), size=24)
 
 
@@ -39,9 +39,7 @@ def printed(results: Results, encoding: str = "utf-8", width: int = 80) -> list[
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
-def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(
-    records: list[dict[str, Any]], encoding: str
-) -> None:
+def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(records, encoding):
     renamed = [{**one, "label": LONG if one["label"] == "HIL" else one["label"]} for one in records]
     pairs = tuple((LONG if label == "HIL" else label, name) for label, name in layout().pairs)
     results = found(renamed, pairs=pairs, camera=frozenset({LONG}), reported={})
@@ -56,13 +54,13 @@ def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(
             assert results.headline.number(results.row(name, condition)[results.headline.column]) in text
 
 
-def test_the_answer_of_the_report_stands_below_the_tables(records: list[dict[str, Any]]) -> None:
+def test_the_answer_of_the_report_stands_below_the_tables(records):
     results, file = found(records), io.StringIO()
     print_answer(Console(file=file, width=80), results)
     assert " ".join(file.getvalue().split()) == " ".join(f"- {line}" for line in kind_of(results).answer(results))
 
 
-def test_methods_stand_in_their_groups_with_letter_difference_and_photographs(records: list[dict[str, Any]]) -> None:
+def test_methods_stand_in_their_groups_with_letter_difference_and_photographs(records):
     lines = printed(found(records, camera=frozenset({"HIL"})))
     text = "\n".join(lines)
     order = ["With photographs", "HIL", "No camera", "GS, 5", "Knows the display:", "Oracle"]
@@ -73,13 +71,13 @@ def test_methods_stand_in_their_groups_with_letter_difference_and_photographs(re
     assert hil.rstrip("│ ").endswith("300")  # photographs of six targets
 
 
-def test_a_row_with_a_hole_has_no_letter_and_says_how_many_targets_it_has(records: list[dict[str, Any]]) -> None:
+def test_a_row_with_a_hole_has_no_letter_and_says_how_many_targets_it_has(records):
     (row, *_) = [line for line in printed(found(records)) if "GS" in line]
     assert "GS, 5 of 6 targets" in row
     assert row.strip("│ ").startswith("GS")
 
 
-def test_reasons_of_holes_are_grouped_and_counted(records: list[dict[str, Any]]) -> None:
+def test_reasons_of_holes_are_grouped_and_counted(records):
     text = " ".join(" ".join(printed(found(records))).split())
     assert f"without a score: 1 of {len(records)} cells 1 failed (GS on leto-aged): registration" in text
     holes = [
@@ -90,7 +88,7 @@ def test_reasons_of_holes_are_grouped_and_counted(records: list[dict[str, Any]])
     assert "2 failed (SGD on ideal): 0 values are NaN 1 unavailable (SGD on ideal): 2 values are NaN" in text
 
 
-def test_many_reasons_are_cut_and_a_study_without_holes_has_no_such_line(records: list[dict[str, Any]]) -> None:
+def test_many_reasons_are_cut_and_a_study_without_holes_has_no_such_line(records):
     done = [one for one in records if one["state"] == "done"]
     assert not any("without a score" in line for line in printed(found(done)))
     holes = [
@@ -100,7 +98,7 @@ def test_many_reasons_are_cut_and_a_study_without_holes_has_no_such_line(records
     assert printed(found([*done, *holes]))[-1] == f"  and {26 - MOST_REASONS} more reasons, in details.md"
 
 
-def test_no_text_can_control_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_text_can_control_the_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "60")
     table = Table("label\x1b[2J", title="a title\x1b]0;x\x07")
     table.add_row("row\x9b1m", style="bold")

@@ -16,7 +16,7 @@ from tests.support.fake_study import write_config
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def drawn(monkeypatch):
     """What sheets have been drawn from; no bench is opened."""
     sources: list[str] = []
     monkeypatch.setattr(opening, "simulated", lambda display, seed: SimpleNamespace())
@@ -29,9 +29,7 @@ def sheet(folder: Path) -> Sheet:
     return found
 
 
-def test_a_sheet_that_is_there_is_not_drawn_again(
-    tmp_path: Path, drawn: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sheet_that_is_there_is_not_drawn_again(tmp_path, drawn, monkeypatch):
     wanted = sheet(tmp_path)
     wanted()
     assert drawn == [wanted.identity]
@@ -40,15 +38,13 @@ def test_a_sheet_that_is_there_is_not_drawn_again(
     assert len(drawn) == 1
 
 
-def test_a_sheet_that_cannot_be_drawn_is_a_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sheet_that_cannot_be_drawn_is_a_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(opening, "simulated", lambda display, seed: 1 / 0)
     draw_sheets([sheet(tmp_path)], threads=1)
     assert capsys.readouterr().err == "holoeval: no stage sheet of ideal: division by zero\n"
 
 
-def test_the_panel_of_a_config_is_known_before_it_is_checked(tmp_path: Path) -> None:
+def test_the_panel_of_a_config_is_known_before_it_is_checked(tmp_path):
     study = load_study(write_config(tmp_path))
     assert _panel(study.file) == study.display.panel
     for text in (
@@ -63,7 +59,7 @@ def test_the_panel_of_a_config_is_known_before_it_is_checked(tmp_path: Path) -> 
     assert _panel(tmp_path / "missing.yaml") is None
 
 
-def test_a_study_is_finished_when_its_last_run_ended_and_its_config_is_still_the_same(tmp_path: Path) -> None:
+def test_a_study_is_finished_when_its_last_run_ended_and_its_config_is_still_the_same(tmp_path):
     study, output = load_study(write_config(tmp_path)), tmp_path / "out"
     assert not _is_finished(study.file, output)
     described = provenance.begin(output, provenance.describe(study, planning.plan(study), output, 1, 1), resumed=False)
@@ -74,7 +70,7 @@ def test_a_study_is_finished_when_its_last_run_ended_and_its_config_is_still_the
     assert not _is_finished(study.file, output)
 
 
-def test_a_report_of_another_config_is_not_replaced_without_a_word(tmp_path: Path) -> None:
+def test_a_report_of_another_config_is_not_replaced_without_a_word(tmp_path):
     study = load_study(write_config(tmp_path))
     assert replaced(study, tmp_path) == ""
     (tmp_path / "report.md").write_text("")

@@ -1,7 +1,7 @@
 """The JSON schema of configs: it takes what ships, and refuses by structure what a config may not be."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,18 +47,16 @@ BEYOND = (
 
 
 @pytest.fixture(scope="module")
-def known() -> dict[str, Any]:
+def known():
     return study_schema()
 
 
 @pytest.fixture(scope="module")
-def fits(known: dict[str, Any]) -> Callable[[Any], bool]:
+def fits(known):
     return Draft202012Validator(known).is_valid
 
 
-def test_the_schema_is_one_and_takes_every_config_that_ships(
-    known: dict[str, Any], fits: Callable[[Any], bool]
-) -> None:
+def test_the_schema_is_one_and_takes_every_config_that_ships(known, fits):
     Draft202012Validator.check_schema(known)
     for path in sorted((ROOT / "configs").glob("*.yaml")):
         assert fits(load(path).data), path
@@ -66,7 +64,7 @@ def test_the_schema_is_one_and_takes_every_config_that_ships(
 
 
 @pytest.mark.parametrize(("old", "new"), [(old, new) for old, new, _ in CHANGES])
-def test_a_mistake_of_structure_does_not_fit(fits: Callable[[Any], bool], old: str, new: str) -> None:
+def test_a_mistake_of_structure_does_not_fit(fits, old, new):
     try:
         data = parse("full.yaml", FULL.replace(old, new, 1)).data
     except UserError:
@@ -84,18 +82,18 @@ def test_a_mistake_of_structure_does_not_fit(fits: Callable[[Any], bool], old: s
         "{name: hil, grid: {retrieval: [{step: 0.1}, {step: 0}]}}",
     ],
 )
-def test_parameters_are_those_of_the_method(fits: Callable[[Any], bool], text: str) -> None:
+def test_parameters_are_those_of_the_method(fits, text):
     data = parse("full.yaml", FULL.replace("- wirtinger", f"- {text}")).data
     assert not fits(data)
 
 
-def test_parameters_of_a_default_method_are_those_of_that_method(fits: Callable[[Any], bool]) -> None:
+def test_parameters_of_a_default_method_are_those_of_that_method(fits):
     data = parse("full.yaml", FULL).data
     assert fits({**data, "holograms": {"params": {"iterations": 3}}})
     assert not fits({**data, "holograms": {"params": {"beta": 0.9}}})
 
 
-def test_every_key_has_a_description(known: dict[str, Any]) -> None:
+def test_every_key_has_a_description(known):
     def keys(schema: Any, where: str) -> Iterator[tuple[str, Any]]:
         for name, entry in schema.get("properties", {}).items():
             yield f"{where}.{name}", entry
@@ -107,6 +105,6 @@ def test_every_key_has_a_description(known: dict[str, Any]) -> None:
     assert [name for name, entry in found.items() if not entry.get("description")] == []
 
 
-def test_what_is_printed_is_that_schema(known: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_printed_is_that_schema(known, capsys):
     schema()
     assert json.loads(capsys.readouterr().out) == known

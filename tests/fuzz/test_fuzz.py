@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 
@@ -33,7 +32,7 @@ def damaged(content: bytes, draw: random.Random) -> bytes:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_what_is_to_begin_with_is_read(name: str, tmp_path: Path) -> None:
+def test_what_is_to_begin_with_is_read(name, tmp_path):
     read = 0
     for content in TARGETS[name].begin():
         with suppress(*REFUSALS):
@@ -44,7 +43,7 @@ def test_what_is_to_begin_with_is_read(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # Pillow's, of tags
 @pytest.mark.parametrize("name", TARGETS)
-def test_damaged_input_is_read_or_refused(name: str, tmp_path: Path) -> None:
+def test_damaged_input_is_read_or_refused(name, tmp_path):
     draw, inputs = random.Random(name), TARGETS[name].begin()
     for _ in range(INPUTS.get(name, OTHERS)):
         with suppress(*REFUSALS):

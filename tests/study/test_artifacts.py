@@ -15,7 +15,6 @@ import torch
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory, read_log
-from holobench_eval.study.displays import Preparation
 from tests.support.trained_study import (
     artifact_of,
     assert_refused,
@@ -29,7 +28,7 @@ from tests.support.trained_study import (
 pytestmark = pytest.mark.usefixtures("no_physics")
 
 
-def test_an_artifact_says_what_it_was_made_for_and_is_made_once_for_all_studies_that_need_it(tmp_path: Path) -> None:
+def test_an_artifact_says_what_it_was_made_for_and_is_made_once_for_all_studies_that_need_it(tmp_path):
     config = write(tmp_path)
     outcome = compute(config)
     assert outcome.failed == 0
@@ -48,7 +47,7 @@ def test_an_artifact_says_what_it_was_made_for_and_is_made_once_for_all_studies_
 
 
 @pytest.fixture(scope="module")
-def needed(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
+def needed(tmp_path_factory):
     """What a study has to learn."""
     (needed,) = needs(write(tmp_path_factory.mktemp("needed")))
     return needed
@@ -66,9 +65,7 @@ def needed(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
         ({}, 2, "profile version 1, this study needs 2"),
     ],
 )
-def test_an_artifact_that_was_learned_for_another_display_is_refused(
-    tmp_path: Path, needed: Preparation, spec: dict[str, Any], version: int, words: str
-) -> None:
+def test_an_artifact_that_was_learned_for_another_display_is_refused(tmp_path, needed, spec, version, words):
     display = replace(needed.display, version=version, spec=replace(needed.display.spec, **spec))
     other, artifacts = replace(needed, display=display), Artifacts(tmp_path)
     artifacts.write(needed, {}, {"captures": 2, "seconds": 0.5})
@@ -159,9 +156,7 @@ DAMAGES: list[tuple[Callable[[Path], Any], str]] = [
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGES)
-def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
-    tmp_path: Path, needed: Preparation, damage: Callable[[Path], None], words: str
-) -> None:
+def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(tmp_path, needed, damage, words):
     artifacts = Artifacts(tmp_path / "artifacts")
     artifacts.write(needed, {"gain": torch.ones(3)}, {"captures": 2, "seconds": 0.5})
     assert artifacts.load(needed).state["gain"].tolist() == [1, 1, 1]
@@ -176,8 +171,8 @@ def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(
 
 
 def test_a_run_with_a_hostile_artifact_ends_with_one_line_and_exit_code_2_unless_it_trains_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     compute(write(tmp_path))
     other = write(tmp_path, ("count: 1", "count: 2"))
     place = artifact_of(other)
@@ -189,7 +184,7 @@ def test_a_run_with_a_hostile_artifact_ends_with_one_line_and_exit_code_2_unless
     assert holoeval(monkeypatch, other, "--retrain") == 0
 
 
-def test_an_unfinished_value_that_is_damaged_is_refused(tmp_path: Path) -> None:
+def test_an_unfinished_value_that_is_damaged_is_refused(tmp_path):
     memory = FolderMemory(tmp_path)
     memory.save("a value", {"a": torch.ones(2)})
     assert torch.equal(memory.load("a value")["a"], torch.ones(2))  # type: ignore[index]
@@ -200,7 +195,7 @@ def test_an_unfinished_value_that_is_damaged_is_refused(tmp_path: Path) -> None:
         memory.load("a value")
 
 
-def test_values_of_any_name_stay_in_their_folder(tmp_path: Path) -> None:
+def test_values_of_any_name_stay_in_their_folder(tmp_path):
     memory = FolderMemory(tmp_path / "one")
     for name in ("../../up", "/absolute", "a/b", "a_b", ""):
         memory.save(name, {"name": name})
@@ -211,7 +206,7 @@ def test_values_of_any_name_stay_in_their_folder(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["one"]
 
 
-def test_an_artifact_whose_training_read_another_file_is_made_again(tmp_path: Path) -> None:
+def test_an_artifact_whose_training_read_another_file_is_made_again(tmp_path):
     (needed,) = needs(write(tmp_path))
     artifacts, weights = Artifacts(tmp_path / "artifacts"), tmp_path / "weights.bin"
     weights.write_bytes(b"1")
@@ -222,7 +217,7 @@ def test_an_artifact_whose_training_read_another_file_is_made_again(tmp_path: Pa
     assert not artifacts.has(needed)
 
 
-def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path: Path) -> None:
+def test_a_logged_row_is_merged_with_an_older_one_of_its_round_and_step(tmp_path):
     memory = FolderMemory(tmp_path)
     for row in ({"round": 1, "step": 10, "l1": 0.5}, {"round": 1, "fidelity": 20.0}, {"note": "x"}, {"note": "y"}):
         memory.log(row)

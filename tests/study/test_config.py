@@ -55,7 +55,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_a_complete_config_becomes_a_study(tmp_path: Path) -> None:
+def test_a_complete_config_becomes_a_study(tmp_path):
     study = load_study(write(tmp_path, FULL))
     assert (study.title, study.seed, study.repeats, study.baseline) == ("A study", 7, 2, "GS")
     assert (study.display.panel, study.display.exposure) == ((128, 256), "matched")
@@ -64,7 +64,7 @@ def test_a_complete_config_becomes_a_study(tmp_path: Path) -> None:
     assert (study.name, study.text) == ("study", FULL)
 
 
-def test_a_grid_is_a_row_for_each_combination(tmp_path: Path) -> None:
+def test_a_grid_is_a_row_for_each_combination(tmp_path):
     grid = "{name: wirtinger, params: {loss: huber}, grid: {iterations: [10, 50], step: [0.5, 1e-3]}}"
     text = exchanged(
         FULL, ("- wirtinger", f"- {grid}"), ("baseline: GS", "baseline: wirtinger, iterations 50, step 0.5")
@@ -79,7 +79,7 @@ def test_a_grid_is_a_row_for_each_combination(tmp_path: Path) -> None:
     assert load_study(tmp_path / "study.yaml", Changes(methods=("wirtinger",))).labels == study.labels[:4]
 
 
-def test_defaults_are_filled_in(tmp_path: Path) -> None:
+def test_defaults_are_filled_in(tmp_path):
     text = "title: t\ndisplay: {profiles: [ideal]}\ntargets: {dataset: 'sets.py:Images'}\nmethods: [wirtinger]\n"
     study = load_study(write(tmp_path, text))
     assert (study.baseline, study.display.panel, study.reported) == ("wirtinger", None, None)
@@ -143,22 +143,22 @@ CHANGES = [
 
 
 @pytest.mark.parametrize(("old", "new", "message"), CHANGES)
-def test_a_mistake_is_one_line_at_its_place(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_a_mistake_is_one_line_at_its_place(tmp_path, old, new, message):
     assert old in FULL
     assert_refused(write(tmp_path, FULL.replace(old, new, 1)), message)
 
 
-def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path: Path) -> None:
+def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path):
     text = FULL.replace("- wirtinger", "- {name: gerchberg_saxton, params: {iterations: 12}}")
     assert_refused(write(tmp_path, text), "10:5: methods[1] has the method, parameters and display")
 
 
-def test_a_missing_config_is_named(tmp_path: Path) -> None:
+def test_a_missing_config_is_named(tmp_path):
     with pytest.raises(UserError, match=r"absent\.yaml: no such file"):
         load_study(tmp_path / "absent.yaml")
 
 
-def test_every_config_of_the_repository_asks_its_question_and_says_what_would_change_the_answer() -> None:
+def test_every_config_of_the_repository_asks_its_question_and_says_what_would_change_the_answer():
     for path in sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")):
         if path.stem not in ("hil-paper", "peers", "photographs"):  # these need what is not here
             assert "?" in load_study(path).question, path
@@ -166,7 +166,7 @@ def test_every_config_of_the_repository_asks_its_question_and_says_what_would_ch
 
 
 @pytest.mark.parametrize(("panel", "enough"), [("[64, 64]", (118, 118)), ("[64, 256]", (118, 256))])
-def test_a_panel_that_is_too_small_gets_the_smallest_one(tmp_path: Path, panel: str, enough: tuple[int, int]) -> None:
+def test_a_panel_that_is_too_small_gets_the_smallest_one(tmp_path, panel, enough):
     with pytest.raises(UserError, match=rf"at least 96, which a panel of \[{enough[0]}, {enough[1]}\] has$"):
         load_study(write(tmp_path, FULL.replace("[128, 256]", panel)))
     assert load_study(write(tmp_path, FULL.replace("[128, 256]", str(list(enough))))).display.panel == enough
@@ -174,7 +174,7 @@ def test_a_panel_that_is_too_small_gets_the_smallest_one(tmp_path: Path, panel: 
         load_study(write(tmp_path, FULL.replace("[128, 256]", str([enough[0] - 1, enough[1]]))))
 
 
-def test_a_parameter_of_ones_own_method_may_not_say_what_only_its_class_declares(tmp_path: Path) -> None:
+def test_a_parameter_of_ones_own_method_may_not_say_what_only_its_class_declares(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Mine:\n    privileged: bool = False\n\n"
         "    def solve(self, target, bench):\n        return target\n"

@@ -55,7 +55,7 @@ PEAKS = (peak_of_what_is_let_go, peak_beside_what_is_held, peak_of_what_is_taken
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
-def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_taken_again() -> None:
+def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_taken_again():
     """In a process of its own: in one where the program break could once not be raised, as other tests may leave it,
     glibc no longer gives back what lies at the end of its memory."""
     code = f"import json; from {__name__} import PEAKS; print(json.dumps([vars(of()) for of in PEAKS]))"
@@ -68,7 +68,7 @@ def test_the_peak_counts_without_earlier_ones_or_held_memory_and_with_what_is_ta
     assert again > LARGE / 2
 
 
-def test_without_the_linux_files_time_alone_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_linux_files_time_alone_is_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(cost, "PROCESS", tmp_path / "nowhere")
     taken = cost.start().stop()
     assert taken.memory_mib is None
@@ -81,7 +81,7 @@ class Node:
     own: Node
 
 
-def test_what_a_solution_left_in_circles_is_let_go_before_the_next() -> None:
+def test_what_a_solution_left_in_circles_is_let_go_before_the_next():
     cost.start().stop()
     left = Node()
     left.own = left
@@ -92,11 +92,11 @@ def test_what_a_solution_left_in_circles_is_let_go_before_the_next() -> None:
 
 
 @pytest.fixture(autouse=True)
-def every_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def every_time(monkeypatch):
     monkeypatch.setattr(cost, "APART", 0.0)
 
 
-def test_estimates_use_the_last_measurement_and_many_write_few_files(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_estimates_use_the_last_measurement_and_many_write_few_files(monkeypatch):
     for seconds in (2.5, 9.0):
         cost.keep("a", seconds)
         assert cost.recorded("a") == seconds
@@ -106,7 +106,7 @@ def test_estimates_use_the_last_measurement_and_many_write_few_files(monkeypatch
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", "x", "-1", "NaN", "inf", "\xff"])
-def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
+def test_a_damaged_file_counts_as_no_measurement(content):
     cost.keep("a", 2.5)
     (cost.folder() / "a").write_text(content, encoding="latin-1")
     assert cost.recorded("a") is None
@@ -114,14 +114,14 @@ def test_a_damaged_file_counts_as_no_measurement(content: str) -> None:
     assert cost.recorded("a") == 3.0
 
 
-def test_without_a_folder_to_write_to_there_are_no_estimates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_folder_to_write_to_there_are_no_estimates(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     cost.keep("a", 2.5)
     assert cost.recorded("a") is None
 
 
-def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path: Path) -> None:
+def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repeat(tmp_path):
     add_other_profile(tmp_path)
     config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
     config.write_text(f"{config.read_text()}repeats: 2\ntiming: alone\n")
@@ -134,7 +134,7 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
     assert not cost.timed(replace(study, timing="shared"), grid)
 
 
-def test_targets_share_a_time_and_threads_workers_and_methods_do_not(tmp_path: Path) -> None:
+def test_targets_share_a_time_and_threads_workers_and_methods_do_not(tmp_path):
     first, second = plan(load_study(write_config(tmp_path))).tasks[-2:]
     assert first.cells[0].target != second.cells[0].target
     assert cost.key(first, 1, 1) == cost.key(second, 1, 1) == cost.key(replace(first, label="renamed"), 1, 1)

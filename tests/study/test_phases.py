@@ -32,7 +32,7 @@ methods: [double_phase]
 
 
 @pytest.fixture
-def found(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def found(monkeypatch):
     """Where double phase was solved: the targets, in order."""
     names: list[str] = []
     solve = DoublePhase.solve
@@ -61,7 +61,7 @@ def scores(outcome: Outcome) -> list[dict[str, float]]:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_path: Path, found: list[str]) -> None:
+def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_path, found):
     outcome = compute(write_study(tmp_path, 10), tmp_path / "out")
     assert found == ["tv_lines", "gray_ramp"]
     assert outcome.solved == 2
@@ -69,7 +69,7 @@ def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_p
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: Path, found: list[str]) -> None:
+def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path, found):
     results = tmp_path / RESULTS
     first = compute(write_study(tmp_path), results / "a")
     second = compute(write_study(tmp_path, 3), results / "b", executor=Serial())
@@ -83,14 +83,14 @@ def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: 
     assert len(found) == 6  # a folder that lies elsewhere shares nothing
 
 
-def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
+def test_only_studies_of_a_folder_of_results_share_their_phases():
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path: Path) -> None:
+def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path):
     for name in ("one", "two"):
         write_ideal(tmp_path / f"{name}.yaml", ("name: ideal", f"name: {name}"))
     config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
@@ -100,7 +100,7 @@ def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(t
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path: Path, found: list[str]) -> None:
+def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path, found):
     config, output = write_study(tmp_path), tmp_path / "out"
     before = scores(compute(config, output))
     cells = [cell for cell in plan(load_study(config)).cells if cell.code]
@@ -118,7 +118,7 @@ def flipped(content: bytes) -> bytes:
     return content[:middle] + bytes([content[middle] ^ 64]) + content[middle + 1 :]
 
 
-def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
+def test_a_solution_is_read_as_it_was_kept(tmp_path):
     phases = Phases(tmp_path)
     phases.keep("ab", SOLUTION)
     for learned in ("abc", None):
@@ -136,7 +136,7 @@ def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
     assert phases.read("cd", None) is None  # of another name
 
 
-def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
+def test_a_damaged_file_is_never_a_phase(tmp_path):
     phases = Phases(tmp_path)
     phases.keep("ab", SOLUTION)
     file = phases.path("ab")
@@ -153,7 +153,7 @@ def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path: Path, found: list[str]) -> None:
+def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path, found):
     results = tmp_path / RESULTS
     shared = compute(write_study(tmp_path), results / "a", executor=TURNS)
     config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))
@@ -166,7 +166,7 @@ def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tm
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and_no_others(tmp_path: Path) -> None:
+def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and_no_others(tmp_path):
     config = trained_study.write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
     first = trained_study.compute(config)
     phases = phases_of(tmp_path / "out")

@@ -13,7 +13,7 @@ def study_in(folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), **opt
     return load_study(write_config(folder, methods, **options))  # type: ignore[arg-type]
 
 
-def test_the_grid_is_methods_by_displays_by_targets_by_repeats(tmp_path: Path) -> None:
+def test_the_grid_is_methods_by_displays_by_targets_by_repeats(tmp_path):
     add_other_profile(tmp_path)
     config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
     config.write_text(config.read_text() + "repeats: 4\n")
@@ -22,14 +22,14 @@ def test_the_grid_is_methods_by_displays_by_targets_by_repeats(tmp_path: Path) -
     assert len({cell.id for cell in cells}) == len(cells)
 
 
-def test_a_method_on_some_displays_has_cells_on_those_only(tmp_path: Path) -> None:
+def test_a_method_on_some_displays_has_cells_on_those_only(tmp_path):
     add_other_profile(tmp_path)
     entry = '{name: "plugins.py:Toy", profiles: [other.yaml]}'
     grid = plan(study_in(tmp_path, (entry,), profiles="ideal, other.yaml", count=1))
     assert [cell.condition for cell in grid.cells] == [REFERENCE] * 5 + ["other"]
 
 
-def test_a_blind_method_is_solved_once_for_displays_of_equal_optics_and_a_seeing_one_on_each(tmp_path: Path) -> None:
+def test_a_blind_method_is_solved_once_for_displays_of_equal_optics_and_a_seeing_one_on_each(tmp_path):
     add_other_profile(tmp_path)
 
     def solved(method: str = "plugins.py:Toy") -> list[int]:
@@ -43,13 +43,13 @@ def test_a_blind_method_is_solved_once_for_displays_of_equal_optics_and_a_seeing
     assert solved() == [1, 1]
 
 
-def test_the_wrong_target_is_the_next_one_and_a_single_target_has_none(tmp_path: Path) -> None:
+def test_the_wrong_target_is_the_next_one_and_a_single_target_has_none(tmp_path):
     wrong = {c.target: c.params["target"] for c in plan(study_in(tmp_path)).cells if c.method == "floor_wrong_target"}
     assert wrong == {"gray 0": "gray 1", "gray 1": "gray 2", "gray 2": "gray 0"}
     assert set(FLOORS) - {cell.method for cell in plan(study_in(tmp_path, count=1)).cells} == {"floor_wrong_target"}
 
 
-def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path: Path) -> None:
+def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path):
     add_one_laser(tmp_path)
 
     def floors(profiles: str) -> dict[str, set[str]]:

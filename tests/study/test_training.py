@@ -4,7 +4,6 @@ import json
 import shutil
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +45,7 @@ def gain(**params: object) -> tuple[str, str]:
     return '"trained.py:Gain"', json.dumps({"name": "trained.py:Gain", "params": params})
 
 
-def test_a_spent_budget_fails_its_cells_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_spent_budget_fails_its_cells_alone(tmp_path, monkeypatch, capsys):
     config = write(tmp_path, BESIDE, gain(rounds=4), ("held_out: 1", "held_out: 1, captures: 3"))
     assert holoeval(monkeypatch, config) == 1
     printed = capsys.readouterr()
@@ -66,7 +63,7 @@ def test_a_spent_budget_fails_its_cells_alone(
     assert rows == [["Even", "ideal", 1, 0], ["Gain", "ideal", 0, 1]]
 
 
-def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path: Path) -> None:
+def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path):
     config = write(tmp_path, gain())
     file = tmp_path / "trained.py"
     blind = "    def blind(self):\n        return True\n\n    def prepare(self"
@@ -75,7 +72,7 @@ def test_a_method_that_says_it_trains_without_captures_gets_none(tmp_path: Path)
     assert reason.endswith("has used its 0 captures for training")
 
 
-def test_a_budget_that_is_enough_changes_nothing_but_the_name(tmp_path: Path) -> None:
+def test_a_budget_that_is_enough_changes_nothing_but_the_name(tmp_path):
     free = write(tmp_path)
     compute(free)
     before = artifact_of(free)
@@ -92,7 +89,7 @@ def same_state(one: Path, other: Path) -> bool:
     return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
 
 
-def test_a_training_that_fails_is_told_with_its_reason_and_tried_again_when_asked(tmp_path: Path) -> None:
+def test_a_training_that_fails_is_told_with_its_reason_and_tried_again_when_asked(tmp_path):
     lines: list[str] = []
     config = write(tmp_path, BESIDE, gain(fail="no\n light"))
     outcome = compute(config, write=lines.append)
@@ -105,7 +102,7 @@ def test_a_training_that_fails_is_told_with_its_reason_and_tried_again_when_aske
     assert rounds(tmp_path) == [0, 1]  # what was kept before the failure is not done again
 
 
-def test_a_reason_goes_when_the_training_succeeds(tmp_path: Path) -> None:
+def test_a_reason_goes_when_the_training_succeeds(tmp_path):
     config = write(tmp_path)
     plugins = tmp_path / "trained.py"
     good = plugins.read_text()
@@ -117,15 +114,13 @@ def test_a_reason_goes_when_the_training_succeeds(tmp_path: Path) -> None:
     assert not (artifact_of(config) / "failure.log").exists()
 
 
-def test_a_target_among_the_training_images_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_target_among_the_training_images_is_refused(tmp_path, monkeypatch, capsys):
     config = write(tmp_path, ('"trained.py:Unseen"', '"trained.py:Pictures"'))
     assert_refused(holoeval(monkeypatch, config), capsys.readouterr(), "training image 'picture 0' is the scored")
     assert rounds(tmp_path) == []
 
 
-def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path: Path) -> None:
+def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path):
     class Losing(Serial):
         def map(self, function: Any, jobs: Any) -> Any:
             for job in jobs:
@@ -137,7 +132,7 @@ def test_a_lost_worker_is_the_reason_of_a_training_that_fails(tmp_path: Path) ->
     assert outcome.records[-1]["reason"] == "not trained: ConnectionError: the worker is gone"
 
 
-def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:
+def test_held_out_images_are_the_last_ones(tmp_path):
     config = write(tmp_path, ('"trained.py:Gain"', '"trained.py:Blind"'), ("held_out: 1", "held_out: 2"))
     compute(config)
     state = torch.load(artifact_of(config) / STATE, weights_only=True)["state"]
@@ -145,7 +140,7 @@ def test_held_out_images_are_the_last_ones(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_that_was_not(tmp_path: Path) -> None:
+def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_that_was_not(tmp_path):
     config = write(tmp_path, gain(rounds=5, pause=0.15))
     place = artifact_of(config)
     killed_at(lambda: progress(place)[0] == 3, studies.compute_faked, config, tmp_path / "out")
@@ -173,7 +168,7 @@ def test_a_training_that_was_killed_ends_with_the_bits_and_the_captures_of_one_t
     assert list(place.rglob(f"{TEMPORARY}*")) == []
 
 
-def test_artifacts_that_several_runs_need_at_once_are_made_by_one_of_them(tmp_path: Path) -> None:
+def test_artifacts_that_several_runs_need_at_once_are_made_by_one_of_them(tmp_path):
     (needed,) = needs(write(tmp_path))
     artifacts, entered = Artifacts(tmp_path / "artifacts"), threading.Event()
 
@@ -188,7 +183,7 @@ def test_artifacts_that_several_runs_need_at_once_are_made_by_one_of_them(tmp_pa
     assert entered.wait(5)
 
 
-def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_path: Path) -> None:
+def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_path):
     told: list[str] = []
     follower = Follower(0.01)
     logs = {name: FolderMemory(tmp_path / name) for name in ("one", "two")}
@@ -215,7 +210,7 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
     assert follower.done.is_set()
 
 
-def test_a_run_says_what_it_trains_and_when_it_has(tmp_path: Path) -> None:
+def test_a_run_says_what_it_trains_and_when_it_has(tmp_path):
     lines: list[str] = []
     config = write(tmp_path)
     compute(config, write=lines.append)
@@ -238,7 +233,7 @@ class Telling(Gain):
 
 
 @pytest.fixture
-def known(monkeypatch: pytest.MonkeyPatch) -> None:
+def known(monkeypatch):
     """The fake display has a truth: that of the ideal one."""
     profile = load_profile("ideal").scaled((64, 64))
     monkeypatch.setattr(fake_study.FakeBench, "profile", profile, raising=False)
@@ -257,7 +252,7 @@ def provenance(folder: Path, form: str) -> dict[str, Any]:
 
 @pytest.mark.usefixtures("known")
 @pytest.mark.parametrize(("form", "missing"), [("[]", ["phase in steps of 2 pi / 256"]), ("['quantisation']", [])])
-def test_estimates_are_kept_beside_the_truth_and_what_is_missing(tmp_path: Path, form: str, missing: list[str]) -> None:
+def test_estimates_are_kept_beside_the_truth_and_what_is_missing(tmp_path, form, missing):
     kept = provenance(tmp_path, form)
     rows = kept["estimates"]
     assert [(row["name"], row["colour"]) for row in rows] == [("phase_gain", colour) for colour in range(3)]
@@ -289,7 +284,7 @@ class Mine:
 
 
 @pytest.fixture
-def records(tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
+def records(tmp_path):
     """Runs a study of one target with a method that takes two captures; its record."""
     (tmp_path / "mine.py").write_text(PHOTOGRAPHING)
     config = write_config(tmp_path, ('"mine.py:Mine"',), count=1)
@@ -303,8 +298,8 @@ def records(tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
 
 
 def test_a_failed_cell_has_its_captures_and_a_retry_those_of_both_and_a_new_solution_after_a_score_its_own(
-    tmp_path: Path, records: Callable[..., list[dict[str, Any]]]
-) -> None:
+    tmp_path, records
+):
     fault, found = tmp_path / "fail", list[tuple[str, int]]()
     fault.touch()
     for number in range(3):
@@ -318,7 +313,7 @@ def test_a_failed_cell_has_its_captures_and_a_retry_those_of_both_and_a_new_solu
     assert [record["captures"] for record in records()] == [2]
 
 
-def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_made_anew_its_own(tmp_path: Path) -> None:
+def test_a_training_that_is_tried_again_has_the_captures_of_both_and_one_made_anew_its_own(tmp_path):
     config = write(tmp_path)
     plugins = tmp_path / "trained.py"
     dark = 'if number == 1 and Path(__file__).with_name("dark").exists():\n                raise ValueError("dark")\n'

@@ -78,7 +78,7 @@ class Untidy(Unprepared):
 
 
 @pytest.mark.parametrize("method", [Good, Good(2.0), changed(lambda phase, *_: phase.double().numpy()), Photographing])
-def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
+def test_a_method_that_keeps_the_contract_passes(method):
     check_method(method)
 
 
@@ -99,11 +99,11 @@ def test_a_method_that_keeps_the_contract_passes(method: Any) -> None:
         (int, "not a dataclass"),
     ],
 )
-def test_a_broken_promise_is_named(method: Any, message: str) -> None:
+def test_a_broken_promise_is_named(method, message):
     with pytest.raises(AssertionError, match=message):
         check_method(method)
 
 
-def test_a_method_that_captures_without_a_camera_is_stopped() -> None:
+def test_a_method_that_captures_without_a_camera_is_stopped():
     with pytest.raises(Exception, match="declares no camera"):
         check_method(changed(photographed))

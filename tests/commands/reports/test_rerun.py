@@ -64,27 +64,27 @@ def committed(folder: Path, *methods: str) -> Committed:
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def both(tmp_path_factory):
     """The folder of a report of two methods."""
     return committed(tmp_path_factory.mktemp("toys"), *TWO).config.parent
 
 
 @pytest.fixture
-def toys(both: Path, tmp_path: Path, no_physics: None) -> Committed:
+def toys(both, tmp_path, no_physics):
     """A copy of it."""
     shutil.copytree(both, tmp_path, dirs_exist_ok=True)
     return Committed(tmp_path)
 
 
 @pytest.fixture
-def trained(tmp_path: Path) -> Committed:
+def trained(tmp_path):
     """A report of a method that is trained, and its artifact."""
     made = Committed(tmp_path)
     made.commit(trained_study.compute(trained_study.write(tmp_path), "reports/study"))
     return made
 
 
-def test_an_untouched_report_is_reproduced_to_the_digit_and_stays_untouched(toys: Committed) -> None:
+def test_an_untouched_report_is_reproduced_to_the_digit_and_stays_untouched(toys):
     before = {path: path.read_bytes() for path in toys.report.iterdir() if path.is_file()}
     verdict = toys.check()
     floors, solved = 2 * 6, 2 * 2  # whose cells have two scores, and three
@@ -92,15 +92,13 @@ def test_an_untouched_report_is_reproduced_to_the_digit_and_stays_untouched(toys
     assert {path: path.read_bytes() for path in toys.report.iterdir() if path.is_file()} == before
 
 
-def test_a_sample_solves_no_more_than_its_cells(toys: Committed) -> None:
+def test_a_sample_solves_no_more_than_its_cells(toys):
     before = len(solves(toys.config.parent))
     assert toys.check(count=3).cells == 3
     assert len(solves(toys.config.parent)) == before + 2  # the third is a floor
 
 
-def test_a_number_that_was_changed_is_named_and_a_difference_between_machines_is_within_tolerance(
-    toys: Committed,
-) -> None:
+def test_a_number_that_was_changed_is_named_and_a_difference_between_machines_is_within_tolerance(toys):
     target = toys.change("other", 0.5)
     toys.change("Toy", 0.02)
     verdict = toys.check()
@@ -112,13 +110,13 @@ def test_a_number_that_was_changed_is_named_and_a_difference_between_machines_is
     assert verdict.close == 1
 
 
-def test_scores_by_an_earlier_protocol_are_judged_with_a_word(toys: Committed) -> None:
+def test_scores_by_an_earlier_protocol_are_judged_with_a_word(toys):
     records = toys.report / "records.csv"
     records.write_text(records.read_text().replace(",v2", ",v1"))
     assert toys.check(count=2).notes == ["scores by metric protocol v1 beside those by v2 now"]
 
 
-def test_a_method_that_makes_other_phases_is_found(toys: Committed) -> None:
+def test_a_method_that_makes_other_phases_is_found(toys):
     plugins = toys.config.with_name("plugins.py")
     plugins.write_text(
         plugins.read_text().replace("torch.full(shape, self.value)", "torch.full(shape, self.value + 9)")
@@ -131,7 +129,7 @@ def test_a_method_that_makes_other_phases_is_found(toys: Committed) -> None:
     assert any(told in note for note in verdict.notes)
 
 
-def test_a_method_that_fails_now_is_found(toys: Committed) -> None:
+def test_a_method_that_fails_now_is_found(toys):
     plugins = toys.config.with_name("plugins.py")
     plugins.write_text(plugins.read_text().replace("time.sleep(self.pause)", 'raise ValueError("no light")'))
     faults = toys.check().faults
@@ -141,7 +139,7 @@ def test_a_method_that_fails_now_is_found(toys: Committed) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_what_cannot_be_rerun_is_named_or_counted(tmp_path: Path) -> None:
+def test_what_cannot_be_rerun_is_named_or_counted(tmp_path):
     failing = '{name: "plugins.py:Toy", params: {fail: "no light"}}'
     following = '{name: "plugins.py:Following", label: oracle}'
     made = committed(tmp_path, failing, TWO[1], following)
@@ -156,7 +154,7 @@ def test_what_cannot_be_rerun_is_named_or_counted(tmp_path: Path) -> None:
     assert all(words in note for words, note in zip(told, verdict.notes, strict=True))
 
 
-def test_a_trained_method_needs_the_artifact_of_its_training(trained: Committed) -> None:
+def test_a_trained_method_needs_the_artifact_of_its_training(trained):
     assert trained.check().faults == []
     path, artifact = trained.report / "records.csv", trained_study.artifact_of(trained.config)
     text, sha256 = path.read_text(), json.loads((artifact / "provenance.json").read_text())["sha256"]
@@ -175,7 +173,7 @@ def test_a_trained_method_needs_the_artifact_of_its_training(trained: Committed)
     assert not artifact.parent.exists()
 
 
-def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path: Path) -> None:
+def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path):
     planned = candidates(tmp_path, displays=2, methods=3, targets=10)
     drawn = sample(planned, 12, seed=0)
     assert Counter(each.task.label for each in drawn) == {"floor": 3, "m0": 3, "m1": 3, "m2": 3}
@@ -183,7 +181,7 @@ def test_cells_are_drawn_evenly_over_methods_and_displays(tmp_path: Path) -> Non
     assert abs(displays["ideal"] - displays["leto-mild"]) <= 1
 
 
-def test_the_draw_depends_on_the_seed_alone(tmp_path: Path) -> None:
+def test_the_draw_depends_on_the_seed_alone(tmp_path):
     planned = candidates(tmp_path, displays=1, methods=1, targets=20)
     first, again, other = (sample(cells, 5, seed) for cells, seed in ((planned, 0), (planned[::-1], 0), (planned, 1)))
     assert first == again
@@ -203,9 +201,7 @@ def candidates(folder: Path, displays: int, methods: int, targets: int) -> list[
 
 
 @pytest.mark.parametrize(("by", "code"), [(0.0, 0), (0.5, 1)])
-def test_the_command_says_what_it_found(
-    toys: Committed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], by: float, code: int
-) -> None:
+def test_the_command_says_what_it_found(toys, monkeypatch, capsys, by, code):
     monkeypatch.setattr(executors, "executor", lambda *_: Serial())
     monkeypatch.chdir(toys.config.parent)
     toys.change("Toy", by)
@@ -216,9 +212,7 @@ def test_the_command_says_what_it_found(
     assert f"1 report, {code} problem" in shown
 
 
-def test_a_run_that_is_not_finished_is_said_to_be_so(
-    toys: Committed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_is_not_finished_is_said_to_be_so(toys, monkeypatch, capsys):
     monkeypatch.chdir(toys.config.parent)
     for path in (toys.report / "records.csv", toys.report / "table.csv"):
         path.unlink()

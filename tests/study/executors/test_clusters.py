@@ -47,8 +47,8 @@ for job in sys.argv[1:]:
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
 def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_process_where_the_run_reads(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     from distributed import LocalCluster
 
     config = write_config(tmp_path)
@@ -66,13 +66,13 @@ def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_proces
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
-def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path: Path) -> None:
+def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
     with pytest.raises(UserError, match=r"does not see the folder .*gone"):
         clusters._at_home(str(tmp_path / "gone"), resources, 0)
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_records_that_cannot_be_seen_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_records_that_cannot_be_seen_end_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "LATE", 0.0)
 
     class Elsewhere(Serial):
@@ -92,7 +92,7 @@ def until_seen(_: object) -> None:
 
 
 @pytest.mark.parametrize("waiting", [False, True], ids=["with a job", "before its first job"])
-def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest.MonkeyPatch, waiting: bool) -> None:
+def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch, waiting):
     import dask
     from distributed import LocalCluster
 
@@ -117,7 +117,7 @@ def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest
         SEEN.set()
 
 
-def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
     monkeypatch.setattr("holobench_eval.study.executors.clusters.ANSWER", 1.0)
     with pytest.raises(UserError, match="no Dask scheduler answers at 'tcp:") as caught:
         _ = Address("tcp://127.0.0.1:9").workers
@@ -132,7 +132,7 @@ def resources(_: int) -> dict[str, float]:
 
 
 @pytest.fixture
-def one_gpu_of_two() -> Iterator[str]:
+def one_gpu_of_two():
     """The address of a scheduler with two workers, one of which declares a GPU."""
     from distributed import Client, Scheduler, SpecCluster, Worker
 
@@ -148,8 +148,8 @@ def one_gpu_of_two() -> Iterator[str]:
 
 @pytest.mark.parametrize(("on_gpu", "workers", "declared"), [(True, 1, {1}), (False, 2, {0, 1})])
 def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one_and_on_the_cpu_to_any(
-    one_gpu_of_two: str, on_gpu: bool, workers: int, declared: set[int]
-) -> None:
+    one_gpu_of_two, on_gpu, workers, declared
+):
     chosen = Address(one_gpu_of_two, on_gpu)
     assert chosen.workers == workers
     assert {found.get("GPU", 0) for _, found in chosen.map(resources, range(6))} == declared  # type: ignore[union-attr]
@@ -159,7 +159,7 @@ UNUSABLE = [(2, False, "has several threads"), (1, True, "declares a GPU; start 
 
 
 @pytest.mark.parametrize(("threads", "on_gpu", "message"), UNUSABLE)
-def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads: int, on_gpu: bool, message: str) -> None:
+def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads, on_gpu, message):
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=1, threads_per_worker=threads, processes=False, dashboard_address=None) as cluster:
@@ -169,7 +169,7 @@ def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads: int, 
 
 
 @pytest.fixture
-def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def queue(tmp_path, monkeypatch):
     """A SLURM queue that starts every job at once, and the file that it keeps their scripts in."""
     pytest.importorskip("dask_jobqueue")
     import dask
@@ -189,8 +189,8 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.slow
 @pytest.mark.parametrize("on_gpu", [False, True])
 def test_jobs_of_a_slurm_queue_run_on_workers_of_one_thread_that_declare_a_gpu_beside_the_sites_own_arguments(
-    queue: Path, on_gpu: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    queue, on_gpu, monkeypatch
+):
     import dask
 
     for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:

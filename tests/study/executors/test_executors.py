@@ -33,9 +33,7 @@ def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(tmp_path, monkeypatch):
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", lose_a_worker)
@@ -49,9 +47,7 @@ def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(tmp_path, monkeypatch):
     methods = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}, pause: 0.2}}}}' for i in range(3))
     config = write_config(tmp_path, methods)
     config.write_text(f"{config.read_text()}timing: alone\n")
@@ -68,7 +64,7 @@ def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path: Path) -> None:
+def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path):
     class Both(Serial):
         def map(self, function: Any, jobs: Any) -> Any:
             for job in jobs:
@@ -98,8 +94,8 @@ def endless(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_an_error_is_the_result_of_its_job(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.chdir(tmp_path)
@@ -115,7 +111,7 @@ def run_of_two(folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
-def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> None:
+def test_workers_end_with_their_run(tmp_path, ending):
     def end(run: int) -> None:
         wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
         os.kill(run, ending)
@@ -136,7 +132,7 @@ def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> N
 
 
 @pytest.mark.slow
-def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path: Path) -> None:
+def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path):
     (tmp_path / "slow.py").write_text("import time\nopen('importing', 'w').close()\ntime.sleep(1)")
     code = """if True:
         import time
@@ -163,7 +159,7 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others() -> None:
+def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others():
     processes.prepare()
     server: Any = forkserver._forkserver  # type: ignore[attr-defined]
     before = server._forkserver_pid
@@ -180,7 +176,7 @@ OTHERS = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial
 
 
 @pytest.mark.parametrize("chosen", [*NEEDY, *OTHERS])
-def test_workers_are_prepared_only_where_they_are_needed(chosen: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_are_prepared_only_where_they_are_needed(chosen, monkeypatch):
     begun: list[bool] = []
     monkeypatch.setattr(executors, "prepare", lambda: begun.append(True))
     monkeypatch.setattr(executors, "_cores", lambda: 2)
@@ -188,7 +184,7 @@ def test_workers_are_prepared_only_where_they_are_needed(chosen: Any, monkeypatc
     assert bool(begun) == (chosen in NEEDY)
 
 
-def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
+def test_the_serial_executor_takes_a_job_when_it_starts_it():
     taken: list[int] = []
 
     def jobs() -> Any:
@@ -213,8 +209,6 @@ def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
         ("slurm", None, None, "needs --workers"),
     ],
 )
-def test_an_executor_that_cannot_be_is_refused(
-    name: str, workers: int | None, address: str | None, message: str
-) -> None:
+def test_an_executor_that_cannot_be_is_refused(name, workers, address, message):
     with pytest.raises(UserError, match=message):
         executor(name, workers, address=address)

@@ -20,7 +20,7 @@ MEAN = float(TARGET.mean())
 
 @settings(max_examples=40, deadline=None)
 @given(black=st.floats(0.1, 2.0), gain=st.floats(1e-3, 1e6))
-def test_a_constant_is_seen_at_any_gain_and_not_once_it_is_taken_off(black: float, gain: float) -> None:
+def test_a_constant_is_seen_at_any_gain_and_not_once_it_is_taken_off(black, gain):
     """black: of the mean of the light."""
     counts = gain * (TARGET + black * MEAN)
     lifted = darkest(counts, TARGET)

@@ -82,11 +82,11 @@ def at_work(folder: Path) -> list[psutil.Process]:
 
 
 @pytest.fixture(autouse=True)
-def in_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def in_the_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path: Path) -> None:
+def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path):
     taken = taken_by("Plain", tmp_path)
     assert taken.cpu_s is not None
     assert taken.memory_mib is not None
@@ -95,7 +95,7 @@ def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", ["SetsPeakBack", "HasItDone", "LeavesIt"])
-def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(name: str, tmp_path: Path) -> None:
+def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(name, tmp_path):
     taken = taken_by(name, tmp_path)
     assert taken.memory_mib is not None
     assert MIB < taken.memory_mib < 2 * MIB
@@ -107,21 +107,21 @@ def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(na
         assert not at_work(tmp_path)
 
 
-def test_work_before_the_call_is_on_the_clock(tmp_path: Path) -> None:
+def test_work_before_the_call_is_on_the_clock(tmp_path):
     taken = taken_by("Plain", tmp_path, "\nos.register_at_fork(after_in_child=burn)\n")
     assert taken.seconds > 0.3
     assert taken.cpu_s is not None
     assert taken.cpu_s > 0.3
 
 
-def test_processes_that_start_with_its_import_are_refused(tmp_path: Path) -> None:
+def test_processes_that_start_with_its_import_are_refused(tmp_path):
     start = f"\nsubprocess.Popen([sys.executable, '-c', {BURNER.format(mib=1, more=True)!r}, os.getcwd()])\n"
     with pytest.raises(Exception, match="starts processes while its file is imported; start them in solve or prepare"):
         taken_by("Plain", tmp_path, start)
     assert not at_work(tmp_path)
 
 
-def test_of_this_process_all_its_processors_count() -> None:
+def test_of_this_process_all_its_processors_count():
     watch = cost.start()
     subprocess.run([sys.executable, "-c", "import time\nwhile time.process_time() < 0.3: pass"], check=True)
     taken = watch.stop()

@@ -27,7 +27,7 @@ def scores(records: list[dict[str, Any]], label: str) -> list[tuple[str, dict[st
 
 
 @pytest.mark.slow
-def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path: Path) -> None:
+def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path):
     made = compute(config(tmp_path, "made", "double_phase"), tmp_path / "made").records
     saved = tmp_path / "made" / "phases" / "double_phase" / "leto-aged"
     read = f'{{name: phases, label: read, params: {{file: "{saved}/{{target}}.npy"}}}}'
@@ -49,7 +49,7 @@ def ids(grid: Plan) -> dict[str, str]:
     return {cell.target: cell.id for label, cell in grid.labelled() if label == "phases"}
 
 
-def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_file_is_another_cell_of_its_target_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = config(tmp_path, "files", '{name: phases, params: {file: "{target}.npy"}}')
     with pytest.raises(UserError, match=r"none of the files that it reads is there, such as astronaut\.npy"):
@@ -68,7 +68,7 @@ def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkey
 
 
 @pytest.fixture
-def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def pictures(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("pictures").mkdir()
     for seed, name in enumerate(("a.jpg", "a.png", "red cup.png")):
@@ -85,7 +85,7 @@ def named(pictures: Path, file: str, amplitude: str = "") -> Path:
 
 
 @pytest.mark.parametrize("files", [("{stem}.npy",), ("{target}.npy", "{stem}.npy"), ("{stem}-{channel}.npy",)])
-def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures: Path, files: tuple[str, ...]) -> None:
+def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures, files):
     message = r"method 'phases': '\{stem\}.*\.npy' is the same file, a.*\.npy, for the targets 'a\.jpg' and 'a\.png'; "
     with pytest.raises(UserError, match=message) as refused:
         planned(named(pictures, *files))
@@ -94,7 +94,7 @@ def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures: Path, 
     assert len(ids(planned(named(pictures, "{stem}.npy")))) == 2
 
 
-def test_one_file_for_all_targets_is_no_mistake_and_a_target_with_an_altered_name_is_named(pictures: Path) -> None:
+def test_one_file_for_all_targets_is_no_mistake_and_a_target_with_an_altered_name_is_named(pictures):
     assert len(set(ids(planned(named(pictures, "a.npy"))).values())) == 3
     for name in ("a.jpg", "a.png"):
         (pictures / name).unlink()
@@ -117,8 +117,8 @@ mine.files = lambda target_name: ["mine.npy"]
 
 
 def test_a_method_of_a_file_says_which_files_it_reads_and_one_that_changed_after_planning_is_not_taken_for_the_planned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "method.py").write_text(METHOD)
     path = config(tmp_path, "files", '"method.py:mine"')

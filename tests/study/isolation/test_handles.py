@@ -27,13 +27,13 @@ def public(cls: type[Any]) -> set[str]:
 
 
 @pytest.mark.parametrize(("inside", "apart"), PAIRS)
-def test_both_handles_have_the_same_public_names(inside: type[Any], apart: type[Any]) -> None:
+def test_both_handles_have_the_same_public_names(inside, apart):
     assert public(inside) == public(apart)
     assert set(REQUESTS[inside]) <= public(inside)
 
 
 @pytest.mark.parametrize(("inside", "apart"), PAIRS)
-def test_functions_of_both_handles_take_the_same_arguments(inside: type[Any], apart: type[Any]) -> None:
+def test_functions_of_both_handles_take_the_same_arguments(inside, apart):
     for name in public(inside):
         ours, theirs = getattr(inside, name, None), getattr(apart, name, None)
         if inspect.isfunction(ours):

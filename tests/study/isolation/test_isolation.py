@@ -66,7 +66,7 @@ SHIPPED = (
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> str:
+def file(tmp_path):
     (tmp_path / "mine.py").write_text(METHODS)
     return str(tmp_path / "mine.py")
 
@@ -75,7 +75,7 @@ def digits(records: list[dict[str, Any]]) -> list[Any]:
     return [[record["label"], record["state"], record["scores"], record["captures"]] for record in records]
 
 
-def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
+def test_what_a_method_declares_is_known_without_its_code(file):
     cls = isolation.find(f"{file}:Mine", Path())
     assert (cls.__name__, cls.__doc__) == ("Mine", "Flat phases.\n\nAnd more.")
     declared = cls.camera, cls.tuned, hasattr(cls, "predict"), hasattr(cls, "trains")
@@ -95,22 +95,20 @@ def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
         ("None", {}, "has no 'None'"),
     ],
 )
-def test_what_is_wrong_with_a_method_is_told_in_one_line(
-    file: str, name: str, params: dict[str, Any], message: str
-) -> None:
+def test_what_is_wrong_with_a_method_is_told_in_one_line(file, name, params, message):
     with pytest.raises(UserError, match=message.replace("(", r"\(")) as caught:
         isolation.build(f"{file}:{name}", params, Path())
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("end", ["import os; os._exit(0)", "raise KeyboardInterrupt", "raise SystemExit(0)"])
-def test_a_file_that_ends_its_process_is_refused_in_one_line(tmp_path: Path, end: str) -> None:
+def test_a_file_that_ends_its_process_is_refused_in_one_line(tmp_path, end):
     (tmp_path / "ends.py").write_text(end)
     with pytest.raises(UserError, match=r"ends.py:Any'.*import"):
         isolation.find("ends.py:Any", tmp_path)
 
 
-def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_path):
     (tmp_path / "ends.py").write_text(
         "import os\nfrom dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Ends:\n"
         "    def __post_init__(self):\n        os.abort()\n\n"
@@ -120,7 +118,7 @@ def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_pat
         isolation.build("ends.py:Ends", {}, tmp_path)
 
 
-def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> None:
+def test_a_method_is_imported_once_until_a_file_beside_it_changes(file):
     first = process_of(f"{file}:Mine", Path())
     assert process_of(f"{file}:Mine", Path()) is first
     assert first.facts.seconds > 0.05
@@ -129,7 +127,7 @@ def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> 
 
 
 @pytest.mark.slow
-def test_what_ships_has_the_digits_that_it_has_inside(tmp_path: Path) -> None:
+def test_what_ships_has_the_digits_that_it_has_inside(tmp_path):
     found = []
     for where in ("process", "files"):
         (tmp_path / where).mkdir()
@@ -174,7 +172,7 @@ class Learns:
 """
 
 
-def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path: Path) -> None:
+def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path):
     found = []
     for where in ("files", "none"):
         folder = tmp_path / where
@@ -198,7 +196,7 @@ def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path:
     assert [captures for *_, captures in short] == [1, 1]
 
 
-def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path: Path) -> None:
+def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path):
     (tmp_path / "learns.py").write_text(LEARNS)
     odd = "{name: 'learns.py:Learns', params: {odd: true}}"
     records = compute(write_study(tmp_path / "study.yaml", odd, training=LEAVES), tmp_path / "out").records
@@ -206,7 +204,7 @@ def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path: Path) -> 
     assert "what prepare returned: a value is object; expected tensors" in reason
 
 
-def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
+def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path):
     text = METHODS.replace("camera: ClassVar[bool] = True", "privileged: ClassVar[bool] = True")
     (tmp_path / "mine.py").write_text(text)
     config = write_study(tmp_path / "study.yaml", "'mine.py:Mine'")
@@ -214,7 +212,7 @@ def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_pat
         compute(config, tmp_path / "out")
 
 
-def test_files_that_a_method_names_by_their_paths_are_known_apart(tmp_path: Path) -> None:
+def test_files_that_a_method_names_by_their_paths_are_known_apart(tmp_path):
     (tmp_path / "named.py").write_text(
         "from pathlib import Path\n\n\ndef named(target, bench): ...\n\n\nnamed.files = lambda item: [Path(item)]\n"
         "named.external = lambda: {'weights': Path('weights.pt'), 'none': None}\n"
@@ -224,7 +222,7 @@ def test_files_that_a_method_names_by_their_paths_are_known_apart(tmp_path: Path
     assert method.external() == {"weights": "weights.pt", "none": None}
 
 
-def test_threads_of_the_harness_are_those_of_a_call(tmp_path: Path) -> None:
+def test_threads_of_the_harness_are_those_of_a_call(tmp_path):
     (tmp_path / "threads.py").write_text(
         "import torch\n\n\ndef threads(target, bench): ...\n\n\n"
         "threads.available = lambda: str(torch.get_num_threads())\n"
@@ -259,31 +257,31 @@ class One:
     return record
 
 
-def test_time_and_memory_are_those_of_the_call(tmp_path: Path) -> None:
+def test_time_and_memory_are_those_of_the_call(tmp_path):
     record = solved(tmp_path, "held = torch.ones(2**26); time.sleep(0.3)")
     assert 0.3 < record["seconds"] < 20
     assert record["memory_mib"] is None or 250 < record["memory_mib"] < 400  # 256 MiB are held
 
 
-def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path: Path) -> None:
+def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path):
     record = solved(tmp_path, "(os.fork() or time.sleep(10_000)) and os._exit(3)")
     assert "ended with exit code 3" in record["reason"]
 
 
-def test_a_file_that_starts_threads_is_refused_since_it_cannot_be_forked(tmp_path: Path) -> None:
+def test_a_file_that_starts_threads_is_refused_since_it_cannot_be_forked(tmp_path):
     top = "import threading; threading.Thread(target=time.sleep, args=(60,), daemon=True).start()"
     with pytest.raises(UserError, match="starts threads while its file is imported"):
         solved(tmp_path, "pass", top)
 
 
-def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path: Path) -> None:
+def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path):
     top = "from holobench_eval.display.simulated.profile import load_profile"
     with pytest.raises(UserError, match=r"one.py:One' imports holobench_eval.display.simulated.*'isolation: none'"):
         solved(tmp_path, "load_profile(bench.spec.name)", top)
     assert solved(tmp_path, "load_profile(bench.spec.name)", top, isolation="none")["state"] == "done"
 
 
-def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_methods_that_have_ended_keep_no_files_open(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "KEPT", 2)
     monkeypatch.setattr(process, "_processes", [])
     counts = []
@@ -297,7 +295,7 @@ def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch:
     assert counts[-1] == counts[3]
 
 
-def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path: Path) -> None:
+def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path):
     (tmp_path / "work").mkdir()
     deaf = "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
     (tmp_path / "work/random.py").write_text(f"{deaf}def Mine(target, bench):\n    return target\n")
@@ -311,7 +309,7 @@ def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_f
     assert (done.returncode, done.stdout.count("Mine")) == (0, 1), done.stderr
 
 
-def test_a_method_s_own_processes_know_its_file(tmp_path: Path) -> None:
+def test_a_method_s_own_processes_know_its_file(tmp_path):
     top = "import multiprocessing\n\n\ndef half(number):\n    return number / 2"
     body = "with multiprocessing.Pool(1) as pool:\n            assert pool.map(half, [4.0]) == [2.0]"
     assert solved(tmp_path, body, top)["reason"] == ""

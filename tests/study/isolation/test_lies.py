@@ -82,7 +82,7 @@ def use(folder: Path) -> None:
 
 
 @pytest.fixture
-def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lie:
+def lie(tmp_path, monkeypatch):
     """Use a method whose process tells something else, as a function makes it of what it really tells."""
     (tmp_path / "mine.py").write_text(METHOD)
 
@@ -93,7 +93,7 @@ def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lie:
     return used
 
 
-def test_the_truth_is_taken(lie: Lie) -> None:
+def test_the_truth_is_taken(lie):
     asked = list[Any]()
     lie(lambda told: asked.append(told) or told)
     assert any(isinstance(told, dict) and told.get("name") == "Mine" for told in asked)
@@ -106,7 +106,7 @@ def each(values: dict[str, list[Any]]) -> list[tuple[str, Any]]:
 @pytest.mark.parametrize(
     ("part", "name", "value"), [*(("", *one) for one in each(FACTS)), *(("code", *one) for one in each(CODE))]
 )
-def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part: str, name: str, value: Any, lie: Lie) -> None:
+def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part, name, value, lie):
     def change(told: Any) -> Any:
         if not (isinstance(told, dict) and "flags" in told):
             return told
@@ -117,7 +117,7 @@ def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part: str, n
 
 
 @pytest.mark.parametrize(("name", "value"), each(RESULTS))
-def test_results_that_no_function_has(name: str, value: Any, lie: Lie, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_no_function_has(name, value, lie, monkeypatch):
     asked = [""]
 
     def send(channel: Channel, told: Any) -> None:
@@ -131,6 +131,6 @@ def test_results_that_no_function_has(name: str, value: Any, lie: Lie, monkeypat
 
 
 @pytest.mark.parametrize("value", NUMBERS)
-def test_numbers_that_no_process_has(value: Any, lie: Lie) -> None:
+def test_numbers_that_no_process_has(value, lie):
     with pytest.raises((UserError, CellError), match="method"):
         lie(lambda told: value if type(told) is int else told)

@@ -43,13 +43,13 @@ def refused(*parts: bytes) -> None:
 
 
 @given(VALUES)
-def test_numbers_text_lists_and_mappings_arrive_as_they_were(value: Any) -> None:
+def test_numbers_text_lists_and_mappings_arrive_as_they_were(value):
     assert passed(value) == value
 
 
 @pytest.mark.parametrize("dtype", TYPES.values())
 @pytest.mark.parametrize("shape", [(), (3,), (2, 0), (2, 3, 4)])
-def test_tensors_of_every_type_and_shape_arrive_to_the_bit(dtype: torch.dtype, shape: tuple[int, ...]) -> None:
+def test_tensors_of_every_type_and_shape_arrive_to_the_bit(dtype, shape):
     tensor = (torch.rand(shape, generator=torch.Generator().manual_seed(1)) * 9).to(dtype)
     found = passed({"here": [tensor, tensor.mT if tensor.ndim > 1 else tensor]})["here"]
     assert found[0].dtype == dtype
@@ -57,7 +57,7 @@ def test_tensors_of_every_type_and_shape_arrive_to_the_bit(dtype: torch.dtype, s
     assert torch.equal(found[1], tensor.mT if tensor.ndim > 1 else tensor)
 
 
-def test_a_capture_arrives_without_its_gradient() -> None:
+def test_a_capture_arrives_without_its_gradient():
     frame = torch.ones(1, 2, 2).requires_grad_()
     found = passed(Capture(frame * 2, 0.0, 9.0, (1.0,)))
     assert isinstance(found, Capture)
@@ -70,7 +70,7 @@ class Odd(torch.Tensor):
 
 
 @pytest.mark.parametrize("value", [torch.zeros(2).as_subclass(Odd), lambda: None, np.zeros(2)])
-def test_what_cannot_be_sent_is_refused_where_it_is_and_leaves_nothing_behind(value: Any) -> None:
+def test_what_cannot_be_sent_is_refused_where_it_is_and_leaves_nothing_behind(value):
     ours, theirs = (Channel(end) for end in Pipe())
     with pytest.raises(CellError, match=r"a value is (Odd|function|ndarray of float64); expected tensors"):
         ours.send([torch.ones(1), {"a": value}])
@@ -94,17 +94,17 @@ def test_what_cannot_be_sent_is_refused_where_it_is_and_leaves_nothing_behind(va
         b'["module", "os"]',
     ],
 )
-def test_what_is_no_message_is_refused(header: bytes) -> None:
+def test_what_is_no_message_is_refused(header):
     refused(header)
 
 
 @pytest.mark.parametrize("content", [b"12", bytes(12), bytes(17)])
-def test_a_tensor_with_too_few_or_too_many_bytes_is_refused(content: bytes) -> None:
+def test_a_tensor_with_too_few_or_too_many_bytes_is_refused(content):
     refused(b'["tensor", "float32", [4]]', content)
 
 
 @given(st.binary(max_size=200))
-def test_no_bytes_do_anything_but_be_refused_or_read(content: bytes) -> None:
+def test_no_bytes_do_anything_but_be_refused_or_read(content):
     ours, theirs = Pipe()
     ours.send_bytes(content)
     ours.close()

@@ -43,7 +43,7 @@ for name, change in {REFUSALS}.items():
 
 
 @pytest.fixture(scope="module")
-def entered() -> dict[str, list[str]]:
+def entered():
     """What is found where each part is forbidden."""
     command = [sys.executable, "-c", CODE]
     done = subprocess.run(command, timeout=PATIENCE, capture_output=True, text=True, check=True)
@@ -51,11 +51,11 @@ def entered() -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("refusal", ["unshare", "maps", "groups", "/proc"])
-def test_where_a_part_is_forbidden_nothing_changes(entered: dict[str, list[str]], refusal: str) -> None:
+def test_where_a_part_is_forbidden_nothing_changes(entered, refusal):
     assert entered[refusal][:3] == ["False", "True", "True"]
 
 
-def test_else_no_other_process_is_there(entered: dict[str, list[str]]) -> None:
+def test_else_no_other_process_is_there(entered):
     is_enclosed, _, same_user, first, numbers = entered["nothing"]
     if is_enclosed == "False":
         pytest.skip("this system allows no namespaces")

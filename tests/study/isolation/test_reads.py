@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
 from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
@@ -82,9 +81,7 @@ def sha256(path: Path) -> str:
 
 
 @pytest.mark.parametrize("build", [inside, apart])
-def test_what_a_call_reads_is_covered_or_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: Callable[[Path], Any]
-) -> None:
+def test_what_a_call_reads_is_covered_or_named(tmp_path, monkeypatch, build):
     study, outside = tmp_path / "study", tmp_path / "outside"
     (outside / "tables").mkdir(parents=True)
     study.mkdir()
@@ -116,14 +113,14 @@ def test_what_a_call_reads_is_covered_or_named(
     }
 
 
-def test_a_method_of_this_package_declares_what_it_reads() -> None:
+def test_a_method_of_this_package_declares_what_it_reads():
     method = isolation.build("double_phase", {}, Path())
     with isolation.opened(method, CPU) as ready:
         Path(__file__).read_text()
     assert ready.reads == isolation.Reads({}, ())
 
 
-def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp_path: Path) -> None:
+def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp_path):
     first, second = tmp_path / "a.txt", tmp_path / "b.txt"
     first.write_text("first")
     covered = {"a.txt": sha256(first), "b.txt": "absent"}
@@ -142,7 +139,7 @@ FILES = [[], {"a": (1, 2)}, {"a": "b"}, {1.5: None}]
 
 
 @pytest.mark.parametrize("told", [None, *({"read": files} for files in FILES), {"written": 3}, {"starts": "<script>"}])
-def test_reads_that_are_no_reads_are_refused(told: Any) -> None:
+def test_reads_that_are_no_reads_are_refused(told):
     ours, theirs = Pipe()
     Channel(theirs).send({"result": 1, "seen": told})
     with pytest.raises(GarbledError, match="no reads"):

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-
-import pytest
 
 from holobench_eval.display import load_profile
 from holobench_eval.study import isolation
@@ -15,7 +12,7 @@ from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.handles import TrainingHandle
 
 
-def test_a_row_of_a_training_may_have_any_names(tmp_path: Path) -> None:
+def test_a_row_of_a_training_may_have_any_names(tmp_path):
     sent: list[dict[str, Any]] = []
     channel: Any = SimpleNamespace(lock=nullcontext(), send=sent.append, receive=lambda: {"value": None})
     known = {"spec": load_profile("ideal").spec((128, 128)), "images": (), "held_out": ()}
@@ -23,7 +20,7 @@ def test_a_row_of_a_training_may_have_any_names(tmp_path: Path) -> None:
     assert sent == [{"ask": "log", "args": (), "named": {"name": 1, "step": 2}}]
 
 
-def test_only_what_a_method_may_declare_is_taken_from_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_a_method_may_declare_is_taken_from_it(tmp_path, monkeypatch):
     flags = {"camera": True, "timed": False, "solve": "mine", "_call": None}
     facts = process.Facts("Mine", "", flags, ["solve"], "", None, 0.0, True)
     monkeypatch.setattr(process, "process_of", lambda *_: SimpleNamespace(facts=facts))

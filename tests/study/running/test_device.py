@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
 
 import pytest
 import torch
@@ -27,9 +26,7 @@ without_gpu = pytest.mark.skipif(torch.cuda.is_available(), reason="there is a C
 
 @without_gpu
 @pytest.mark.parametrize("command", ["run", "plan"])
-def test_a_gpu_that_is_not_there_is_one_line_and_exit_code_2(
-    tmp_path: Path, command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_gpu_that_is_not_there_is_one_line_and_exit_code_2(tmp_path, command, monkeypatch, capsys):
     config, output = write_config(tmp_path), tmp_path / "out"
     monkeypatch.setattr(sys, "argv", ["holoeval", command, str(config), "--output", str(output), "--device", "cuda"])
     with pytest.raises(SystemExit) as stopped:
@@ -44,7 +41,7 @@ def test_a_gpu_that_is_not_there_is_one_line_and_exit_code_2(
 
 @without_gpu
 @pytest.mark.usefixtures("no_physics")
-def test_auto_is_the_cpu_where_there_is_no_gpu_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_is_the_cpu_where_there_is_no_gpu_and_is_told(tmp_path, monkeypatch):
     config = trained_study.write(tmp_path)
     assert trained_study.holoeval(monkeypatch, config, "--device", "auto") == 0
     known = provenance.read(tmp_path / "out")
@@ -55,7 +52,7 @@ def test_auto_is_the_cpu_where_there_is_no_gpu_and_is_told(tmp_path: Path, monke
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_the_provenance_has_the_gpu_and_so_has_the_report(tmp_path: Path) -> None:
+def test_the_provenance_has_the_gpu_and_so_has_the_report(tmp_path):
     config = write_config(tmp_path, count=1)
     assert compute(config, tmp_path / "out").provenance["device"] == "cpu"
     study = load_study(config)
@@ -65,13 +62,13 @@ def test_the_provenance_has_the_gpu_and_so_has_the_report(tmp_path: Path) -> Non
     assert "GPU" not in dict(environment(provenance.describe(study, plan(study), tmp_path, 1, 1)))
 
 
-def test_the_seconds_of_a_gpu_are_kept_apart_and_those_of_the_cpu_where_they_were(tmp_path: Path) -> None:
+def test_the_seconds_of_a_gpu_are_kept_apart_and_those_of_the_cpu_where_they_were(tmp_path):
     task = plan(load_study(write_config(tmp_path))).tasks[-1]
     assert len({cost.key(task, 1, 1, gpu) for gpu in ("", "one GPU", "another GPU")}) == 3
     assert cost.key(task, 1, 1) == cost.key(task, 1, 1, "")
 
 
-def test_a_gpu_is_told_to_repeat_itself_and_to_keep_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gpu_is_told_to_repeat_itself_and_to_keep_single_precision(monkeypatch):
     monkeypatch.delenv("CUBLAS_WORKSPACE_CONFIG", raising=False)
     monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", True)
     with repeatable(1, CPU):
@@ -84,7 +81,7 @@ def test_a_gpu_is_told_to_repeat_itself_and_to_keep_single_precision(monkeypatch
     monkeypatch.delenv("CUBLAS_WORKSPACE_CONFIG")
 
 
-def test_there_are_as_many_workers_as_gpus_unless_asked_otherwise() -> None:
+def test_there_are_as_many_workers_as_gpus_unless_asked_otherwise():
     assert executor("auto", None, gpus=1) == Serial()
     assert executor("auto", None, small=False, gpus=4) == Local(4, 4)
     assert executor("local", None, gpus=1) == Local(1, 1)
@@ -94,7 +91,7 @@ def test_there_are_as_many_workers_as_gpus_unless_asked_otherwise() -> None:
 
 
 @pytest.mark.parametrize(("seen", "expected"), [(None, ["0", "1", "0"]), ("2,5", ["2", "5", "2"])])
-def test_every_worker_sees_one_gpu(seen: str | None, expected: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_worker_sees_one_gpu(seen, expected, monkeypatch):
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     if seen is not None:
         monkeypatch.setenv("CUDA_VISIBLE_DEVICES", seen)
@@ -103,7 +100,7 @@ def test_every_worker_sees_one_gpu(seen: str | None, expected: list[str], monkey
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 @pytest.mark.slow
-def test_a_study_on_a_gpu_has_the_scores_of_the_cpu(tmp_path: Path) -> None:
+def test_a_study_on_a_gpu_has_the_scores_of_the_cpu(tmp_path):
     methods = ("wirtinger", "oracle", "{name: online_camera, params: {captures: 40}}")
     config = write_study(tmp_path / "study.yaml", *methods, display="{profiles: [leto-aged], panel: [192, 192]}")
     scores = {}

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +17,7 @@ TARGETS = 5
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_that_was_killed_and_interrupted_gives_the_records_of_one_that_was_not(tmp_path: Path) -> None:
+def test_a_run_that_was_killed_and_interrupted_gives_the_records_of_one_that_was_not(tmp_path):
     config, output = write_config(tmp_path, count=TARGETS), tmp_path / "out"
 
     with held(tmp_path, 1):

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ FAST = "{name: wirtinger, params: {iterations: 3}}"
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_methods_are_shown_on_a_display_that_was_learned(tmp_path: Path) -> None:
+def test_methods_are_shown_on_a_display_that_was_learned(tmp_path):
     methods = f'[{FAST}, "trained.py:Capturing", "trained.py:Peeking", "trained.py:Gain"]'
     config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', methods), ("title: ", "isolation: none\ntitle: "))
     outcome = compute(config)
@@ -38,7 +37,7 @@ def test_methods_are_shown_on_a_display_that_was_learned(tmp_path: Path) -> None
     assert len(rounds(tmp_path)) == 10
 
 
-def test_a_learned_display_is_one_more_thing_to_learn_and_another_training_gives_other_cells(tmp_path: Path) -> None:
+def test_a_learned_display_is_one_more_thing_to_learn_and_another_training_gives_other_cells(tmp_path):
     config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', f'[{FAST}, "trained.py:Gain"]'))
     grid = plan(load_study(config))
     (place,) = displays(load_study(config)).values()
@@ -66,10 +65,10 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("display", "message"), REFUSED)
-def test_what_is_no_learned_display_is_refused_at_its_place(tmp_path: Path, display: str, message: str) -> None:
+def test_what_is_no_learned_display_is_refused_at_its_place(tmp_path, display, message):
     assert_refused(write(tmp_path, ("profiles: [ideal]", display)), message)
 
 
-def test_a_learned_display_is_a_prediction_and_does_not_measure_others(tmp_path: Path) -> None:
+def test_a_learned_display_is_a_prediction_and_does_not_measure_others(tmp_path):
     config = write(tmp_path, LEARNED, ("seed: 3", "seed: 3\nmeasure: prediction"))
     assert_refused(config, "3:10: a learned display is a prediction already")

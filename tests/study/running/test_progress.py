@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import io
 import math
-from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -27,12 +26,12 @@ def failed(task: planning.Task) -> list[Record]:
 
 
 @pytest.fixture
-def task(tmp_path: Path) -> planning.Task:
+def task(tmp_path):
     """The last of a study."""
     return planning.plan(load_study(write_config(tmp_path))).tasks[-1]
 
 
-def test_plain_lines_come_at_most_every_few_seconds(task: planning.Task) -> None:
+def test_plain_lines_come_at_most_every_few_seconds(task):
     now = [0.0]
     lines: list[str] = []
     watch = Lines(lines.append, clock=lambda: now[0])
@@ -46,7 +45,7 @@ def test_plain_lines_come_at_most_every_few_seconds(task: planning.Task) -> None
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task: planning.Task, terminal: bool) -> None:
+def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task, terminal):
     text = io.StringIO()
     with watching(Console(file=text, force_terminal=terminal, width=120)) as watch:
         watch.planned(2, 1, 0)
@@ -58,7 +57,7 @@ def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task: pla
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) -> None:
+def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path):
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}', "plugins.py:Seeing"))
     study = load_study(config)
     grid, store = planning.plan(study), Store(tmp_path / "out")
@@ -72,7 +71,7 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) ->
     assert all(row.seconds is not None and row.seconds > 0 for row in elsewhere[1:])
 
 
-def test_a_preview_counts_photographs_as_the_board_does(tmp_path: Path) -> None:
+def test_a_preview_counts_photographs_as_the_board_does(tmp_path):
     watching = "{name: online_camera, captures: 9, params: {captures: 12}}"
     study = load_study(write_config(tmp_path, ("wirtinger", watching, "hil", "hil_plus")))
     learning = [
@@ -96,7 +95,7 @@ def printed(study: Study, rows: list[Row], width: int = 160) -> str:
 UNTIMED = Row("c", 1, 2, 4, 50, 0, 0, 4, None)
 
 
-def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_any_is_known(tmp_path: Path) -> None:
+def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_any_is_known(tmp_path):
     study = load_study(write_config(tmp_path))
     text = printed(study, [Row("a[b]", 1, 2, 30, None, 10, 0, 20, 1.5), UNTIMED])
     assert all(word in text for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving"))
@@ -105,7 +104,7 @@ def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_a
     assert all(words in text for words in ("floor images, no method", "all, 18 of them floors"))
 
 
-def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
+def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path):
     rows = [
         Row("online_camera_network", 3, 28, 1234, 2800, 1000, 12, 1222, 12345.0),
         Row("x" * 60, 3, 28, 84, None, 0, 0, 84, None),
@@ -126,7 +125,7 @@ def bar(task: planning.Task, is_whole: bool) -> str:
     return text.getvalue()
 
 
-def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task: planning.Task) -> None:
+def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task):
     now, left, lines = [0.0], [None, 90.0], list[str]()
     watch = Lines(lines.append, clock=lambda: now[0])
     watch.planned(2, 2, 0)
@@ -151,12 +150,12 @@ def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task: pl
 @pytest.mark.parametrize(
     ("seconds", "words"), [(0.25, "0.25 s"), (9.4, "9.4 s"), (99.4, "99 s"), (1351, "23 min"), (12_600, "3.5 h")]
 )
-def test_a_time_is_said_in_the_unit_that_people_would_use(seconds: float, words: str) -> None:
+def test_a_time_is_said_in_the_unit_that_people_would_use(seconds, words):
     assert duration(seconds) == words
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
+def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path):
     study = load_study(write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing")))
     left, started = list[float | None](), list[str]()
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ from tests.support.fake_study import write_config
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
+def test_a_run_says_what_it_ran_on(tmp_path):
     config = write_config(tmp_path, count=1)
     known = compute(config, tmp_path / "out").provenance
     assert known == provenance.read(tmp_path / "out")
@@ -32,7 +31,7 @@ def test_a_run_says_what_it_ran_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_physics")
-def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_computed(tmp_path: Path) -> None:
+def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_computed(tmp_path):
     config, store = write_config(tmp_path, count=1), Store(tmp_path / "out")
     first = compute(config, store.output).provenance
     cells = plan(load_study(config)).cells
@@ -50,7 +49,7 @@ def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"earlier": 5}', '{"earlier": [5]}', "[" * 200_000])
-def test_a_damaged_provenance_is_named(tmp_path: Path, text: str) -> None:
+def test_a_damaged_provenance_is_named(tmp_path, text):
     (tmp_path / "provenance.json").write_text(text)
     with pytest.raises(UserError, match=r"provenance\.json: .*; delete the file"):
         provenance.read(tmp_path)

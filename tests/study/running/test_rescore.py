@@ -50,7 +50,7 @@ MEASURES = {"picture": PICTURE, "focus": FOCUS, "prediction": PREDICTION}
 
 
 @pytest.fixture
-def done(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+def done(monkeypatch):
     """How often a method was at work, and how many photographs were taken for a score."""
     count: Counter[str] = Counter()
     start, photograph = cost.start, CalibratedBench.photograph
@@ -76,7 +76,7 @@ def written(folder: Path, text: str = PICTURE, metrics: str = ONE) -> Path:
 
 
 @pytest.fixture(scope="module")
-def base(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def base(tmp_path_factory):
     """Gives the folder of a study that was computed once, which no test changes."""
 
     @cache
@@ -91,9 +91,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def study(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: Callable[..., Path], done: Counter[str]
-) -> Callable[..., Path]:
+def study(tmp_path, monkeypatch, base, done):
     """Gives the config of a study that was computed by a metric less than it names now."""
     another_metric.add(tmp_path, monkeypatch)
 
@@ -106,7 +104,7 @@ def study(
 
 
 @pytest.fixture
-def fresh(base: Callable[..., Path]) -> Callable[[str], list[dict[str, Any]]]:
+def fresh(base):
     """Gives the records of a study that was computed by both metrics at once."""
 
     def records(measure: str = "picture") -> list[dict[str, Any]]:
@@ -145,9 +143,7 @@ Fresh = Callable[..., list[dict[str, Any]]]
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_a_new_metric_has_the_digits_of_a_fresh_run(
-    study: Study, fresh: Fresh, done: Counter[str], measure: str
-) -> None:
+def test_a_new_metric_has_the_digits_of_a_fresh_run(study, fresh, done, measure):
     config = study(measure)
     grid, store = plan(load_study(config)), Store(config.parent / "out")
     before = store.load(grid)
@@ -167,7 +163,7 @@ def untold(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**record, "scores": None} for record in records]
 
 
-def test_a_run_fills_the_column_too_and_solves_nothing(study: Study, done: Counter[str]) -> None:
+def test_a_run_fills_the_column_too_and_solves_nothing(study, done):
     config = study()
     grid = plan(load_study(config))
     first = [record["scores"]["psnr_linear"] for record in Store(config.parent / "out").load(grid)]
@@ -179,7 +175,7 @@ def test_a_run_fills_the_column_too_and_solves_nothing(study: Study, done: Count
     assert provenance.read(config.parent / "out")["scores"] == grid.metrics
 
 
-def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study: Study) -> None:
+def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study):
     config = study(metrics=BOTH.replace("psnr,", "psnr, gmsd,"))
     before = Store(config.parent / "out").load(plan(load_study(config)))
     outcome = compute(config, rescore=(NAME,))  # from captures
@@ -192,7 +188,7 @@ def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(stu
 
 
 @pytest.mark.parametrize("measure", ["picture", "focus"])
-def test_phases_are_shown_again_to_the_same_bits(study: Study, fresh: Fresh, done: Counter[str], measure: str) -> None:
+def test_phases_are_shown_again_to_the_same_bits(study, fresh, done, measure):
     config = study(measure)
     store, every = Store(config.parent / "out"), cells(config)
     before = [store.capture(cell.id).read_bytes() for cell in every]
@@ -205,9 +201,7 @@ def test_phases_are_shown_again_to_the_same_bits(study: Study, fresh: Fresh, don
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(
-    study: Study, fresh: Fresh, done: Counter[str], measure: str
-) -> None:
+def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(study, fresh, done, measure):
     config = study(measure)
     forget(config)
     again = compute(config, rescore=(NAME,))
@@ -220,7 +214,7 @@ def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(
     assert measured(whole.records) == fresh(measure)
 
 
-def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: Study, done: Counter[str]) -> None:
+def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study, done):
     config = study()
     config.write_text(f"{config.read_text()}save: {{kept: false}}\n")
     forget(config, phases=False)
@@ -231,7 +225,7 @@ def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: S
 
 
 @pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file"])
-def test_the_phase_of_a_damaged_capture_is_photographed_again(study: Study, done: Counter[str], damage: str) -> None:
+def test_the_phase_of_a_damaged_capture_is_photographed_again(study, done, damage):
     config = study()
     file = Store(config.parent / "out").capture(cells(config)[0].id)
     content = file.read_bytes()
@@ -249,7 +243,7 @@ def test_the_phase_of_a_damaged_capture_is_photographed_again(study: Study, done
     assert None not in column(again)
 
 
-def test_records_are_those_of_another_study_only_where_the_captures_are(study: Study) -> None:
+def test_records_are_those_of_another_study_only_where_the_captures_are(study):
     config = study(metrics=ONE)
     config.write_text(config.read_text().replace("seed: 3", "seed: 4"))
     again = compute(config, rescore=("psnr",))

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,7 +12,7 @@ from holobench_eval.core.io import file_name
 from holobench_eval.core.pictures import open_picture
 from holobench_eval.report import Results, layout_of, records_frame
 from holobench_eval.study.config import load_study
-from holobench_eval.study.executors import Executor, Serial
+from holobench_eval.study.executors import Serial
 from holobench_eval.study.executors.clusters import Address
 from holobench_eval.study.executors.local import Local
 from holobench_eval.study.plan import plan
@@ -26,7 +25,7 @@ from tests.support.fake_study import solves, untimed, write_config
 pytestmark = pytest.mark.usefixtures("no_physics")
 
 
-def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path: Path) -> None:
+def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path):
     config, output = write_config(tmp_path), tmp_path / "out"
     first = compute(config, output)
     assert {record["state"] for record in first.records} == {"done"}
@@ -49,7 +48,7 @@ def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path: 
     assert (more.computed, len(more.records)) == (3, 3 * 6 + 2 * 3)
 
 
-def test_an_exception_in_a_method_is_a_failed_cell_that_is_computed_again_only_when_asked(tmp_path: Path) -> None:
+def test_an_exception_in_a_method_is_a_failed_cell_that_is_computed_again_only_when_asked(tmp_path):
     lines: list[str] = []
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no\\n light"}}',))
     outcome = compute(config, tmp_path / "out", lines.append)
@@ -75,7 +74,7 @@ def test_an_exception_in_a_method_is_a_failed_cell_that_is_computed_again_only_w
         ("Nameless", r"^ValueError: \\udcff\.png \(plugins\.py, "),  # no Unicode
     ],
 )
-def test_what_is_no_phase_and_no_text_is_a_failed_cell_with_a_reason(tmp_path: Path, name: str, reason: str) -> None:
+def test_what_is_no_phase_and_no_text_is_a_failed_cell_with_a_reason(tmp_path, name, reason):
     config = write_config(tmp_path, (f'{{name: "plugins.py:{name}"}}',), count=1)
     record = compute(config, tmp_path / "out").records[-1]
     assert record["state"] == "failed"
@@ -84,7 +83,7 @@ def test_what_is_no_phase_and_no_text_is_a_failed_cell_with_a_reason(tmp_path: P
 
 
 @pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])
-def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: Executor) -> None:
+def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path, executor):
     config, output = write_config(tmp_path, count=1), tmp_path / "out"
     compute(config, output)
     cells = plan(load_study(config)).cells
@@ -100,14 +99,14 @@ def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path: Path, executor: E
     assert {record["state"] for record in compute(config, output, executor=executor).records} == {"done"}
 
 
-def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path, monkeypatch):
     monkeypatch.setattr("holobench_eval.study.scoring.scores.score", lambda *_, **__: {"psnr_linear": float("nan")})
     outcome = compute(write_config(tmp_path, count=1), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"failed"}
     assert outcome.records[0]["reason"] == "the score psnr_linear is nan"
 
 
-def test_targets_keep_their_pictures_when_displays_change_places(tmp_path: Path) -> None:
+def test_targets_keep_their_pictures_when_displays_change_places(tmp_path):
     add_one_laser(tmp_path)
     for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
         config = write_config(tmp_path, profiles=order, count=1)
@@ -118,7 +117,7 @@ def test_targets_keep_their_pictures_when_displays_change_places(tmp_path: Path)
         assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1], order
 
 
-def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:
+def test_captures_and_phases_are_saved_on_request(tmp_path):
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: "a/b"}',), count=1)
     config.write_text(config.read_text() + "save: {captures: true, phases: true}\n")
     compute(config, tmp_path / "out")
@@ -132,14 +131,14 @@ def test_captures_and_phases_are_saved_on_request(tmp_path: Path) -> None:
     ]
 
 
-def test_a_folder_in_use_by_another_run_is_refused(tmp_path: Path) -> None:
+def test_a_folder_in_use_by_another_run_is_refused(tmp_path):
     config = write_config(tmp_path, count=1)
     with Store(tmp_path / "out").locked(), pytest.raises(UserError, match="another run is using this folder"):
         compute(config, tmp_path / "out")
     assert compute(config, tmp_path / "out").computed == 5 + 1
 
 
-def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_keeps_what_was_computed(tmp_path, monkeypatch):
     config = write_config(tmp_path)
 
     def interrupt(*_: Any) -> None:
@@ -154,7 +153,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path: Path, monkeypatch: pytes
     assert [run["ended"] for run in earlier] == [None]
 
 
-def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path: Path) -> None:
+def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path):
     config = write_config(tmp_path)
     shared = compute(config, tmp_path / "out", executor=TURNS)
     assert [record["alone"] for record in shared.records[-3:]] == [False] * 3
@@ -170,14 +169,14 @@ def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlie
     assert [record["alone"] for record in single] == [True] * 3
 
 
-def test_workers_that_may_come_time_nothing_alone_unless_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_may_come_time_nothing_alone_unless_asked(tmp_path, monkeypatch):
     monkeypatch.setattr(Address, "workers", 1)
     monkeypatch.setattr(Address, "map", Serial.map)
     records = compute(write_config(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
     assert [record["alone"] for record in records[-3:]] == [False] * 3
 
 
-def test_seconds_are_those_of_the_study_that_reports_them(tmp_path: Path) -> None:
+def test_seconds_are_those_of_the_study_that_reports_them(tmp_path):
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.05}}',), count=1)
     first = compute(config, tmp_path / "a").records[-1]["seconds"]
     assert first >= 0.05
@@ -199,7 +198,7 @@ class Needy(Toy):
 '''
 
 
-def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_left_for_it(tmp_path: Path) -> None:
+def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_left_for_it(tmp_path):
     config, here = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
     (tmp_path / "plugins.py").write_text((tmp_path / "plugins.py").read_text() + NEEDY)
     with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
@@ -213,9 +212,7 @@ def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_lef
 
 
 @pytest.mark.parametrize("asked", ["protocol: {metrics: [psnr, lpips_alex]}", "headline: lpips_alex_srgb"])
-def test_a_metric_without_its_weights_is_refused_by_a_run_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
-) -> None:
+def test_a_metric_without_its_weights_is_refused_by_a_run_alone(tmp_path, monkeypatch, asked):
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
     config = write_config(tmp_path)
     config.write_text(f"{config.read_text()}\n{asked}\n")

@@ -78,7 +78,7 @@ def study_of(folder: Path, *methods: str) -> Path:
     return write_config(folder, tuple(f"{{name: camera.py:{method}}}" for method in methods), count=1)
 
 
-def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path: Path) -> None:
+def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path):
     methods = [f"{name}, captures: 3" for name in ("Greedy", "Deaf", "Modest")]
     config = study_of(tmp_path, *methods, "Greedy, label: none, captures: 2, params: {keeps: false}", "Lying")
     found = compute(config, tmp_path / "out").records
@@ -92,7 +92,7 @@ def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologra
     assert (lying["state"], lying.get("stopped", "")) == ("failed", "")
 
 
-def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path: Path) -> None:
+def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path):
     many = ("Modest", "Modest, label: two, captures: 2", "Modest, label: three, captures: 3")
     tasks = [task for task in plan(load_study(study_of(tmp_path, *many))).tasks if not task.is_floor]
     free, two, _ = (task.cells[0] for task in tasks)
@@ -110,7 +110,7 @@ def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_
         ("camera.py:Modest, captures: many", r":6:\d+: .*captures"),
     ],
 )
-def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path: Path, method: str, message: str) -> None:
+def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path, method, message):
     (tmp_path / "camera.py").write_text(METHODS)
     with pytest.raises(UserError, match=message):
         load_study(write_config(tmp_path, (f"{{name: {method}}}",), count=1))

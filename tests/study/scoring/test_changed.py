@@ -17,7 +17,7 @@ def picture(bright: int, height: int = 60, width: int = 90) -> Tensor:
 
 
 @pytest.mark.parametrize("bright", [0, 1])
-def test_the_brighter_half_loses_its_light_and_the_other_none(bright: int) -> None:
+def test_the_brighter_half_loses_its_light_and_the_other_none(bright):
     target = picture(bright)
     changed = changed_target(target, "half", 3, "t")
     halves = changed.split(45, dim=-1)
@@ -27,7 +27,7 @@ def test_the_brighter_half_loses_its_light_and_the_other_none(bright: int) -> No
 
 
 @pytest.mark.parametrize(("level", "expected"), [(0.2, 1.0), (0.9, 0.0)])
-def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_if_it_was_bright(level: float, expected: float) -> None:
+def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_if_it_was_bright(level, expected):
     target = torch.full((3, 60, 90), level)
     changed = changed_target(target, "patch", 3, "t") != target
     assert changed.sum() == 3 * 12**2
@@ -35,7 +35,7 @@ def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_if_it_was_bright(
     assert not torch.equal(changed, changed_target(target, "patch", 3, "another") != target)
 
 
-def test_the_phase_moves_smoothly_in_the_middle_of_the_panel_alone_and_by_names() -> None:
+def test_the_phase_moves_smoothly_in_the_middle_of_the_panel_alone_and_by_names():
     phase = torch.rand((3, 128, 192), dtype=torch.float64)
     before = phase.clone()
     move = moved_phase(phase, 3, "t") - phase

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -41,7 +40,7 @@ def study(folder: Path, *changes: tuple[str, str]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def scores(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], dict[str, float]]:
+def scores(tmp_path_factory):
     """The scores of every model on both displays, of one target."""
     folder = tmp_path_factory.mktemp("control")
     records = computed(study(folder, NAMED))
@@ -49,29 +48,27 @@ def scores(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], di
 
 
 @pytest.mark.parametrize(("label", "display"), [("Ideal", "ideal"), ("Veil", "veil")])
-def test_a_model_of_the_display_without_noise_has_nearly_full_control(scores: Any, label: str, display: str) -> None:
+def test_a_model_of_the_display_without_noise_has_nearly_full_control(scores, label, display):
     assert all(scores[label, display][name] > 0.95 for name in COLUMNS)
 
 
-def test_a_model_that_predicts_the_same_whatever_is_shown_has_none(scores: Any) -> None:
+def test_a_model_that_predicts_the_same_whatever_is_shown_has_none(scores):
     assert [scores["Even", "veil"][name] for name in COLUMNS] == pytest.approx([0, 0, 0, 0, 1], abs=1e-9)
 
 
-def test_a_tone_curve_predicts_a_veil_and_does_not_control_it(scores: Any) -> None:
+def test_a_tone_curve_predicts_a_veil_and_does_not_control_it(scores):
     tone, veil = scores["Tone", "veil"], scores["Veil", "veil"]
     assert tone["psnr_linear"] > 20
     assert 1 - tone["control_half"] > 20 * (1 - veil["control_half"])
 
 
-def test_floor_images_answer_nothing_and_have_no_control(scores: Any) -> None:
+def test_floor_images_answer_nothing_and_have_no_control(scores):
     floors = [found for (label, _), found in scores.items() if label.startswith("floor_")]
     assert floors
     assert not any(name.startswith("control") for found in floors for name in found)
 
 
-def test_control_is_added_to_what_was_predicted_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scores: Any
-) -> None:
+def test_control_is_added_to_what_was_predicted_before(tmp_path, monkeypatch, scores):
     models = METHODS[1], '["veiled.py:Veil"]'
     config = study(tmp_path, UNNAMED, models)
     before = compute(config)
@@ -87,7 +84,7 @@ def test_control_is_added_to_what_was_predicted_before(
     assert compute(config).computed == 0
 
 
-def test_a_study_that_names_no_metric_has_no_control(tmp_path: Path) -> None:
+def test_a_study_that_names_no_metric_has_no_control(tmp_path):
     assert "control" not in plan(load_study(study(tmp_path))).metrics
 
 
@@ -98,12 +95,12 @@ MATCHED = (("panel: [128, 128]}", "panel: [128, 128], exposure: matched}"),)
 @pytest.mark.parametrize(
     ("changes", "message"), [(PICTURES, "control is a score of models"), (MATCHED, "compares captures of equal light")]
 )
-def test_pictures_and_matched_light_have_no_control(tmp_path: Path, changes: Any, message: str) -> None:
+def test_pictures_and_matched_light_have_no_control(tmp_path, changes, message):
     with pytest.raises(UserError, match=message):
         load_study(study(tmp_path, NAMED, *changes))
 
 
-def test_holograms_that_do_not_follow_their_target_have_no_control(tmp_path: Path) -> None:
+def test_holograms_that_do_not_follow_their_target_have_no_control(tmp_path):
     probe = ("holograms: {params: {iterations: 20}}", 'holograms: {name: "veiled.py:Ideal"}')
     records = compute(study(tmp_path, NAMED, probe, PROFILES[::-1])).records
     reasons = {record["reason"] for record in records if not record["label"].startswith("floor_")}

@@ -59,13 +59,13 @@ TWO_SCENES = ("{planes:", "{scenes: [shapes, shapes-2], planes:")
 TWO_DISPLAYS = ("[ideal]", "[leto-mild, leto-aged]")
 
 
-def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path: Path) -> None:
+def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path):
     tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     assert [len(task.cells) for task in tasks["wirtinger"]] == [2] * 6
     assert [len(task.cells) for task in tasks["multi_plane"]] == [6] * 2
 
 
-def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None:
+def test_cells_carry_the_display_and_where_the_camera_is(tmp_path):
     tasks = tasks_of(write(tmp_path))
     lens = {task.cells[0].target: dict(task.cells[0].change) for task in tasks["wirtinger"]}
     assert lens == {"shapes@-1.5mm": {"refocus": -1.5}, "shapes@0mm": {}, "shapes@1.5mm": {"refocus": 1.5}}
@@ -75,7 +75,7 @@ def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None
     assert "infocus" in plan(load_study(tmp_path / "study.yaml")).metrics
 
 
-def test_the_wrong_target_is_another_scene(tmp_path: Path) -> None:
+def test_the_wrong_target_is_another_scene(tmp_path):
     wrong = {
         cell.target: cell.params["target"]
         for task in tasks_of(write(tmp_path, TWO_SCENES))["floor"]
@@ -92,13 +92,13 @@ Records = dict[tuple[str, str], dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> Records:
+def records(tmp_path_factory):
     """The records of a study on a real bench, by label and target."""
     found = computed(write(tmp_path_factory.mktemp("focus")))
     return {(record["label"], record["cell"]["target"]): record for record in found}
 
 
-def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records: Records, tmp_path: Path) -> None:
+def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records, tmp_path):
     alone = CONFIG[CONFIG.index("  - {name: multi") : CONFIG.index("headline")]
     config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"), (alone, ""))
     pictures = {(r["label"], r["cell"]["target"]): r["scores"] for r in compute(config).records}
@@ -108,20 +108,20 @@ def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records: Re
     assert set(found) - set(plain) == {"psnr_linear_infocus", "ssim_linear_infocus"}
 
 
-def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(records: Records) -> None:
+def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(records):
     for target in ("shapes@-1.5mm", "shapes@1.5mm"):
         joint, middle = (records[label, target]["scores"] for label in ("multi_plane", "Middle"))
         for name in ("psnr_linear", "psnr_linear_infocus"):
             assert joint[name] > middle[name] + 1
 
 
-def test_a_lens_keeps_more_than_the_camera_loses_without_one(records: Records) -> None:
+def test_a_lens_keeps_more_than_the_camera_loses_without_one(records):
     for target in ("shapes@-1.5mm", "shapes@1.5mm"):
         moved, stayed = (records[label, target]["scores"] for label in ("wirtinger", "Middle"))
         assert moved["psnr_linear"] > stayed["psnr_linear"] + 3
 
 
-def test_planes_of_a_scene_share_the_time_of_a_hologram_and_the_floor_is_scored_in_focus_too(records: Records) -> None:
+def test_planes_of_a_scene_share_the_time_of_a_hologram_and_the_floor_is_scored_in_focus_too(records):
     targets = ("shapes@-1.5mm", "shapes@0mm", "shapes@1.5mm")
     assert len({records["multi_plane", target]["seconds"] for target in targets}) == 1
     assert records["floor_constant", "shapes@0mm"]["scores"]["psnr_linear_infocus"] < 25
@@ -134,7 +134,7 @@ def pictures() -> tuple[torch.Tensor, torch.Tensor]:
     return 3 * (wanted + 0.1 * torch.rand(3, 40, 48, generator=draw)), wanted
 
 
-def test_only_errors_in_focus_count_and_those_of_the_whole_picture_where_all_is() -> None:
+def test_only_errors_in_focus_count_and_those_of_the_whole_picture_where_all_is():
     image, wanted = pictures()
     plain = score(image, wanted, metrics=["psnr", "ssim"])
     found = in_focus(image, wanted, torch.ones(40, 48, dtype=torch.bool))
@@ -160,5 +160,5 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("change", "message"), REFUSED)
-def test_what_has_no_planes_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+def test_what_has_no_planes_is_refused_at_its_place(tmp_path, change, message):
     assert_refused(write(tmp_path, change), message)

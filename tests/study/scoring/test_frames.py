@@ -54,7 +54,7 @@ def records_of(tmp_path: Path, display: str, *methods: str) -> list[dict[str, An
     return [record for record in records if record["label"].startswith("m")]
 
 
-def test_frames_are_counted_kept_and_shown_together(tmp_path: Path) -> None:
+def test_frames_are_counted_kept_and_shown_together(tmp_path):
     one, four, nine, wrong = records = records_of(
         tmp_path, "flc-1bit", "", "params: {frames: 4}", "params: {frames: 9}", "params: {frames: 2, wrong: true}"
     )
@@ -71,14 +71,14 @@ def test_frames_are_counted_kept_and_shown_together(tmp_path: Path) -> None:
     assert four["scores"]["psnr_linear"] > one["scores"]["psnr_linear"] + 1  # speckle of four adds up to less
 
 
-def test_a_study_of_single_frames_has_no_column_of_them(tmp_path: Path) -> None:
+def test_a_study_of_single_frames_has_no_column_of_them(tmp_path):
     (record,) = records = records_of(tmp_path, "ideal", "")
     assert record["state"] == "done"
     frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
     assert not {"frames", "panel_time"} & set(frame)
 
 
-def test_panel_time_counts_the_frames_of_every_capture() -> None:
+def test_panel_time_counts_the_frames_of_every_capture():
     column = next(each for each in columns.FIGURES if each.name == "panel_time")
     assert column.unit == "frames"
     assert column.source is not None
@@ -87,7 +87,7 @@ def test_panel_time_counts_the_frames_of_every_capture() -> None:
     assert [column.source(record, None) for record in records] == [8, 408, 51, None, 9]
 
 
-def test_a_method_may_photograph_one_frame_and_give_several(tmp_path: Path) -> None:
+def test_a_method_may_photograph_one_frame_and_give_several(tmp_path):
     (tmp_path / "mine.py").write_text(CAMERA)
     (tmp_path / "study.yaml").write_text(STUDY.format(display="flc-1bit", methods="'mine.py:Looks'"))
     record = next(

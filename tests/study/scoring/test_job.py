@@ -24,7 +24,7 @@ def place(side: int) -> Any:
     return SimpleNamespace(spec=SimpleNamespace(region=SimpleNamespace(shape=(side, side)), wavelengths=(1, 2, 3)))
 
 
-def test_a_target_is_loaded_once_and_given_unspoiled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_target_is_loaded_once_and_given_unspoiled(monkeypatch):
     loads: list[tuple[str, tuple[int, int]]] = []
     load = Charts.load
 
@@ -43,12 +43,12 @@ def test_a_target_is_loaded_once_and_given_unspoiled(monkeypatch: pytest.MonkeyP
     assert loads == [("tv_lines", (40, 40)), ("gray_ramp", (40, 40)), ("tv_lines", (48, 48))]
 
 
-def test_a_target_that_changed_since_the_plan_is_refused() -> None:
+def test_a_target_that_changed_since_the_plan_is_refused():
     with pytest.raises(CellError, match="'tv_lines' has changed since the study was planned"):
         load_target(source("tv_lines", sha256="another"), place(40))
 
 
-def test_a_target_that_is_black_is_refused_before_anything_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_target_that_is_black_is_refused_before_anything_is_solved(monkeypatch):
     monkeypatch.setattr(Charts, "load", lambda self, item, shape, channels=3: torch.zeros(channels, *shape))
     with pytest.raises(CellError, match="target 'tv_lines' is black; expected light in at least one of its colours"):
         load_target(source("tv_lines"), place(33))

@@ -69,7 +69,7 @@ def named(label: str, name: str, params: str = "{}") -> str:
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path: Path, isolation: str) -> None:
+def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path, isolation):
     double = "{double: true}"
     methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array"), named("levels", "levels")]
     methods += [named("t64", "Tensors", double), named("a64", "Arrays", double)]
@@ -82,7 +82,7 @@ def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path: Pat
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path, isolation: str) -> None:
+def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path, isolation):
     found = {}
     for shown in ("Tensors", "Arrays", "levels"):
         predicted, shown_by = (named("t", "Tensors"), named("a", "Arrays")), f"{{name: 'mine.py:{shown}'}}"
@@ -95,7 +95,7 @@ def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
-def test_real_numbers_become_a_tensor_of_its_own_memory(dtype: str) -> None:
+def test_real_numbers_become_a_tensor_of_its_own_memory(dtype):
     array = np.arange(24, dtype=dtype).reshape(2, 3, 4)[:, ::-1].transpose(2, 0, 1)
     array.flags.writeable = False
     tensor = from_numpy(array)
@@ -109,5 +109,5 @@ OTHER = [np.zeros(2, np.float16), np.zeros(2, np.complex64), np.zeros(2, np.uint
 
 
 @pytest.mark.parametrize("value", [*OTHER, np.float32(1), torch.zeros(2), [1.0], None])
-def test_all_else_stays_as_it_is(value: Any) -> None:
+def test_all_else_stays_as_it_is(value):
     assert from_numpy(value) is value

@@ -57,25 +57,25 @@ def study(folder: Path, *methods: str) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+def _as_before(monkeypatch):
     """Undo what the methods change."""
     monkeypatch.setattr(protocol, "match", protocol.match)
     monkeypatch.setattr(torch, "randn", torch.randn)
 
 
-def test_an_honest_method_is_let_through(tmp_path: Path) -> None:
+def test_an_honest_method_is_let_through(tmp_path):
     outcome = compute(study(tmp_path, "Honest"), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"done"}
 
 
 @pytest.mark.parametrize("name", ["Flatterer", "Silencer", "Failing"])
-def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path: Path, name: str) -> None:
+def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path, name):
     with pytest.raises(StopError, match=rf"method 'methods.py:{name}' has changed the harness: .* leto-mild"):
         compute(study(tmp_path, name), tmp_path / "out")
     scored = [path for path in Store(tmp_path / "out").folder.glob("*.json") if name in path.read_text()]
     assert scored == []
 
 
-def test_what_the_package_ships_is_not_guarded(tmp_path: Path) -> None:
+def test_what_the_package_ships_is_not_guarded(tmp_path):
     assert plugins.is_shipped("methods", "wirtinger")
     assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:Honest")

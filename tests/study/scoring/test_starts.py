@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
@@ -57,7 +56,7 @@ def score(records: list[dict[str, Any]], label: str, target: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def computed(tmp_path_factory):
     """The folder of a computed study, which no test changes."""
     folder = tmp_path_factory.mktemp("computed")
     with installed():
@@ -66,23 +65,23 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def grid(computed: Path) -> Plan:
+def grid(computed):
     return planned(computed / "study.yaml")
 
 
 @pytest.fixture
-def done(computed: Path, tmp_path: Path) -> Path:
+def done(computed, tmp_path):
     """The config of that study in a folder of its own."""
     shutil.copytree(computed, tmp_path, dirs_exist_ok=True)
     return tmp_path / "study.yaml"
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
+def store(tmp_path):
     return Store(tmp_path / "out")
 
 
-def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repeat(tmp_path: Path) -> None:
+def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repeat(tmp_path):
     add_other_profile(tmp_path)
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), profiles="ideal, other.yaml", count=2)
     config.write_text(f"{config.read_text()}repeats: 2\n")
@@ -97,7 +96,7 @@ def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repea
         assert set(cell.phase["starts"]) == {one.phase_id for one in others}
 
 
-def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path: Path) -> None:
+def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path):
     studies = (POOR, GOOD, FOLLOWING), (FOLLOWING, GOOD, POOR), (POOR, FOLLOWING), (POOR, GOOD)
     both, turned, fewer, without = (planned(write_config(tmp_path, methods, count=1)) for methods in studies)
     assert {cell.id for cell in both.cells} == {cell.id for cell in turned.cells}
@@ -106,9 +105,7 @@ def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_know
 
 
 @pytest.mark.slow
-def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_process_does(
-    done: Path, store: Store, grid: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_process_does(done, store, grid, monkeypatch):
     serial = store.load(grid)
     for target in TARGETS:
         assert score(serial, "oracle", target) == pytest.approx(score(serial, "good", target), abs=1e-3)
@@ -120,7 +117,7 @@ def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_proce
     assert [{**one, "alone": None} for one in untimed(local)] == [{**one, "alone": None} for one in untimed(serial)]
 
 
-def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_again(tmp_path: Path) -> None:
+def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_again(tmp_path):
     config = write_config(tmp_path, (FOLLOWING, POOR, FAILING), count=2)
     first = compute(config)
     assert [one["label"] for one in first if one["state"] == "failed"] == ["good"]
@@ -138,8 +135,8 @@ def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_ag
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_and_gives_the_same_record(
-    done: Path, store: Store, grid: Plan, lost: bool
-) -> None:
+    done, store, grid, lost
+):
     solved = len(solves(done.parent))
     alone = untimed([one for one in store.load(grid) if one["label"] != "oracle"])
     followers = cells(grid, "oracle")
@@ -151,8 +148,8 @@ def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_an
 
 
 def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(
-    done: Path, store: Store, grid: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    done, store, grid, monkeypatch
+):
     first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
     store.path(first.id).unlink()
     states = store.states(grid.cells)
@@ -163,7 +160,7 @@ def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_
     assert not store.path(follower.id).exists()
 
 
-def test_starts_that_are_only_timed_again_leave_their_followers_alone(done: Path, store: Store, grid: Plan) -> None:
+def test_starts_that_are_only_timed_again_leave_their_followers_alone(done, store, grid):
     for cell in grid.cells:
         if (record := store.read(cell.id)) is not None and record.alone:
             store.write(replace(record, alone=False))
@@ -177,9 +174,7 @@ def test_starts_that_are_only_timed_again_leave_their_followers_alone(done: Path
 
 
 @pytest.mark.parametrize("refusal", ["refuse_unscored", "refuse_unavailable"])
-def test_a_run_that_is_refused_removes_no_record(
-    done: Path, store: Store, grid: Plan, refusal: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_is_refused_removes_no_record(done, store, grid, refusal, monkeypatch):
     def refused(*_: Any) -> None:
         raise UserError("not here")
 
@@ -206,9 +201,7 @@ def starts_of(store: Store, cell: Cell) -> list[torch.Tensor]:
 
 @pytest.mark.usefixtures("done")
 @pytest.mark.parametrize("file", [record_file, phase_file])
-def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is_late(
-    store: Store, grid: Plan, file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is_late(store, grid, file, monkeypatch):
     follower, late = cells(grid, "oracle")[0], file(store, cells(grid, "good")[0])
     before = starts_of(store, follower)
     hidden = late.rename(late.with_name("hidden"))
@@ -224,23 +217,21 @@ def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is
 
 
 @pytest.mark.usefixtures("done")
-def test_a_start_in_a_damaged_file_is_an_error(store: Store, grid: Plan) -> None:
+def test_a_start_in_a_damaged_file_is_an_error(store, grid):
     file = phase_file(store, cells(grid, "good")[0])
     file.write_bytes(file.read_bytes()[:-100])
     with pytest.raises(CellError, match=r"\.pt, from which this method starts, is damaged; delete the file"):
         starts_of(store, cells(grid, "oracle")[0])
 
 
-def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian() -> None:
+def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian():
     phase = torch.linspace(-9, 9, 2 * 5 * 7).view(2, 5, 7)
     start = start_of(phase)
     assert float((torch.exp(1j * start) - torch.exp(1j * phase)).abs().max()) < 1e-4
 
 
 @pytest.mark.slow
-def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(
-    computed: Path, grid: Plan, tmp_path: Path
-) -> None:
+def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(computed, grid, tmp_path):
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), count=len(TARGETS))
     for index, begun in ((1, 3), (0, 6)):  # while a start is solved, and while the first follower is
         with held(tmp_path, index):
@@ -249,7 +240,7 @@ def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(
     assert untimed(compute(config)) == untimed(whole)
 
 
-def test_a_phase_that_began_with_another_of_the_same_name_is_not_used(done: Path, store: Store, grid: Plan) -> None:
+def test_a_phase_that_began_with_another_of_the_same_name_is_not_used(done, store, grid):
     phases, solved = phases_of(store.output), len(solves(done.parent))
     follower = cells(grid, "oracle")[0]
     for other in grid.cells:  # as another training leaves them

@@ -33,7 +33,7 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path: Path) -> None:
+def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path):
     tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     for label in ("wirtinger", "light_field"):
         for task in tasks[label]:
@@ -44,7 +44,7 @@ def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path
         assert {cell.condition for cell in cells} == {"ideal-frames", "plm-4bit"}
 
 
-def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path: Path) -> None:
+def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path):
     tasks, dataset = tasks_of(write(tmp_path)), load_study(tmp_path / "study.yaml").dataset
     views = sorted(dataset.views("shapes from 0.1"), key=lambda view: abs(dataset.place(view)))
     (one, every) = (tasks[label][0].cells[0].phase for label in ("wirtinger", "light_field"))
@@ -53,7 +53,7 @@ def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path: Path) 
     assert not one.get("planes")
 
 
-def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(tmp_path: Path) -> None:
+def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(tmp_path):
     records = compute(write(tmp_path)).records
     assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
     scores = {(r["label"], r["cell"]["target"]): r["scores"].get("psnr_linear") for r in records}
@@ -76,7 +76,7 @@ def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(t
         (("profiles: [ideal-frames.yaml]", "profiles: [pluto-fourier]"), "2:10: measure: views needs a Fresnel plane"),
     ],
 )
-def test_what_has_no_views_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+def test_what_has_no_views_is_refused_at_its_place(tmp_path, change, message):
     assert_refused(write(tmp_path, change), message)
 
 
@@ -100,7 +100,7 @@ class Blind:
 """
 
 
-def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path: Path) -> None:
+def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path):
     (tmp_path / "wide.py").write_text(DATASET)
     path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'wide.py:Wide', params"))
     with pytest.raises(UserError, match=r"from -1\.2.*; expected places from '-1' to '1' radii of the iris"):
