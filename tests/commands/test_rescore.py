@@ -21,12 +21,12 @@ from holobench_eval.study.phases import phases_of
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
-from tests.commands import test_moved_session as sessions
+from tests.commands.photographs import test_moved_session as sessions
 from tests.lab.session.running import run, succeed
 from tests.study.running.test_rescore import BOTH, ONE, PICTURE, cells, forget
-from tests.support import another_metric
-from tests.support.another_metric import COLUMN, NAME
-from tests.support.trained_study import compute
+from tests.support.studies import another_metric
+from tests.support.studies.another_metric import COLUMN, NAME
+from tests.support.studies.trained_study import compute
 
 
 @pytest.fixture(autouse=True)

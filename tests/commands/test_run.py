@@ -12,7 +12,7 @@ from holobench_eval.study import opening
 from holobench_eval.study import plan as planning
 from holobench_eval.study.config import load_study
 from holobench_eval.study.running import provenance
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.plan import Plan, Task, plan
 from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.running.run import Outcome, run
-from tests.support.fake_study import install
+from tests.support.studies.fake_study import install
 
 MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
 

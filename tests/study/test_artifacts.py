@@ -15,7 +15,7 @@ import torch
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.artifacts import LOG, PROVENANCE, STATE, Artifacts, FolderMemory, read_log
-from tests.support.trained_study import (
+from tests.support.studies.trained_study import (
     artifact_of,
     assert_refused,
     compute,

@@ -16,7 +16,7 @@ from holobench_eval.study.changes import Changes, noted, recorded
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.test_config import FULL, write
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 TOYS = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: "toy, bright", params: {value: 2.0}}', "plugins.py:Seeing")
 

@@ -14,7 +14,7 @@ from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.studies import add_other_profile
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 ROOT = Path(__file__).parents[2]
 LARGE = 48

@@ -13,7 +13,7 @@ from holobench_eval.study.definition import Study
 from holobench_eval.study.displays import condition
 from holobench_eval.study.opening import open_display
 from holobench_eval.study.plan import Task, plan
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
 

@@ -22,7 +22,7 @@ from holobench_eval.study.displays import Preparation
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.versions import GIVEN, GIVEN_GRAY
 from tests.study.studies import exchanged, write_ideal
-from tests.support import another_metric, fake_trained
+from tests.support.studies import another_metric, fake_trained
 
 CONFIG = """\
 title: "Names"

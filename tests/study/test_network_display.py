@@ -26,7 +26,7 @@ from holobench_eval.study.network_display import write_network
 from holobench_eval.study.opening import open_display
 from tests.study.studies import write_study
 from tests.support.small_training import QUICK
-from tests.support.trained_study import compute
+from tests.support.studies.trained_study import compute
 
 PANEL = (128, 160)
 

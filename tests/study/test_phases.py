@@ -18,8 +18,8 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
 from tests.study.studies import TURNS, compute, exchanged, write_ideal
-from tests.support import trained_study
-from tests.support.fake_study import solves, untimed, write_config
+from tests.support.studies import trained_study
+from tests.support.studies.fake_study import solves, untimed, write_config
 
 SOLUTION = Solution(torch.linspace(-4, 4, 24).view(2, 3, 4), 5, Cost(0.25, 3.5), "has used its 5", "abc", False)
 CONFIG = """\

@@ -6,7 +6,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
 from tests.study.studies import add_one_laser, add_other_profile
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 
 def study_in(folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), **options: object) -> Study:

@@ -17,7 +17,7 @@ from holobench_eval.study import store as store_module
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.store import SCHEMA, Record, Store, appears
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 
 @pytest.fixture(scope="module")

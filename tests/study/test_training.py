@@ -26,10 +26,10 @@ from holobench_eval.study.running.run import run
 from holobench_eval.study.store import Store
 from holobench_eval.study.training import TrainingJob
 from tests.study import studies
-from tests.support import fake_study
-from tests.support.fake_study import write_config
 from tests.support.patience import killed_at, wait_until
-from tests.support.trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
+from tests.support.studies import fake_study
+from tests.support.studies.fake_study import write_config
+from tests.support.studies.trained_study import artifact_of, assert_refused, compute, holoeval, needs, rounds, write
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

@@ -15,7 +15,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.versions import method_version
 from tests.study.studies import compute
-from tests.support.trained_study import needs, write
+from tests.support.studies.trained_study import needs, write
 
 
 def test_the_code_of_an_installed_method_is_all_of_its_package(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute
-from tests.support.fake_study import installed, write_config
+from tests.support.studies.fake_study import installed, write_config
 
 
 @pytest.fixture(scope="session")

@@ -17,8 +17,8 @@ from holobench_eval.study.plan import plan
 from holobench_eval.study.running.run import Outcome
 from tests.commands.test_commands import holoeval
 from tests.study.studies import compute
-from tests.support import trained_study
-from tests.support.fake_study import installed, solves, write_config
+from tests.support.studies import trained_study
+from tests.support.studies.fake_study import installed, solves, write_config
 
 ALL = 1000
 TWO = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: other, params: {value: 5}}')

@@ -22,7 +22,7 @@ from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
 from holobench_eval.study.running import run as running
 from tests.study.executors.test_executors import compute, untimed
-from tests.support.fake_study import fake_work, write_config
+from tests.support.studies.fake_study import fake_work, write_config
 
 SBATCH = """\
 #!{python}

@@ -19,8 +19,8 @@ from holobench_eval.study import executors
 from holobench_eval.study.executors import Executor, Local, Serial, executor, processes
 from holobench_eval.study.running import run as running
 from tests.study import studies
-from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE, wait_until
+from tests.support.studies.fake_study import lose_a_worker, noted_work, solves, write_config
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.phases import RESULTS, Phases
 from tests.study.studies import TURNS
 from tests.study.studies import compute as compute_with
-from tests.support.trained_study import compute, needs, write
+from tests.support.studies.trained_study import compute, needs, write
 
 READING = """
 from dataclasses import dataclass

@@ -18,8 +18,8 @@ from holobench_eval.study.executors.local import one_gpu
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from tests.study.studies import compute, write_study
-from tests.support import trained_study
-from tests.support.fake_study import write_config
+from tests.support.studies import trained_study
+from tests.support.studies.fake_study import write_config
 
 without_gpu = pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
 

@@ -8,9 +8,9 @@ import sys
 import pytest
 
 from tests.study.studies import compute, compute_faked
-from tests.support import fake_study
-from tests.support.fake_study import held, solves, untimed, write_config
 from tests.support.patience import PATIENCE, killed_at, wait_until
+from tests.support.studies import fake_study
+from tests.support.studies.fake_study import held, solves, untimed, write_config
 
 TARGETS = 5
 

@@ -8,7 +8,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import displays
 from holobench_eval.study.plan import plan
 from tests.study.studies import assert_refused
-from tests.support.trained_study import compute, needs, rounds, write
+from tests.support.studies.trained_study import compute, needs, rounds, write
 
 LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')
 FAST = "{name: wirtinger, params: {iterations: 3}}"

@@ -15,7 +15,7 @@ from holobench_eval.study.running.progress import Lines, duration, watching
 from holobench_eval.study.running.run import run
 from holobench_eval.study.store import Record, Store
 from tests.study.studies import compute
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 
 def failed(task: planning.Task) -> list[Record]:

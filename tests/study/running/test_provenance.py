@@ -11,7 +11,7 @@ from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from holobench_eval.study.versions import HARNESS
 from tests.study.studies import compute
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 
 @pytest.mark.usefixtures("no_physics")

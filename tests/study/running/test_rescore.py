@@ -21,9 +21,9 @@ from holobench_eval.study.plan import Cell, plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.support import another_metric, trained_study
-from tests.support.another_metric import COLUMN, NAME
-from tests.support.trained_study import compute
+from tests.support.studies import another_metric, trained_study
+from tests.support.studies.another_metric import COLUMN, NAME
+from tests.support.studies.trained_study import compute
 
 ONE, BOTH = "protocol: {metrics: [psnr]}", f"protocol: {{metrics: [psnr, {NAME}]}}"
 PICTURE = f"""\

@@ -20,7 +20,7 @@ from holobench_eval.study.running import provenance
 from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.store import Store
 from tests.study.studies import TURNS, add_one_laser, compute
-from tests.support.fake_study import solves, untimed, write_config
+from tests.support.studies.fake_study import solves, untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

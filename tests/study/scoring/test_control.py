@@ -12,8 +12,8 @@ from holobench_eval.metrics.control import COLUMNS
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.scoring import prediction
-from tests.support import veiled
-from tests.support.trained_study import compute, computed, write
+from tests.support.studies import veiled
+from tests.support.studies.trained_study import compute, computed, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 20}}")
 NAMED = ("methods:", "protocol: {metrics: [psnr, control]}\nmethods:")

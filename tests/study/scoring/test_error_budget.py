@@ -15,7 +15,7 @@ from holobench_eval.report.data.error_budget import Budget, budgets
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.study.config import load_study
-from tests.support.trained_study import computed, write
+from tests.support.studies.trained_study import computed, write
 
 PROFILE = """\
 name: {name}

@@ -14,7 +14,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE, plan
 from holobench_eval.study.scoring.scores import in_focus
 from tests.study.studies import assert_refused, exchanged, tasks_of
-from tests.support.trained_study import compute, computed
+from tests.support.studies.trained_study import compute, computed
 
 CONFIG = """\
 title: "Depth"

@@ -11,7 +11,7 @@ import torch
 
 from holobench_eval.display.api import from_numpy
 from tests.study.studies import write_study
-from tests.support.trained_study import compute
+from tests.support.studies.trained_study import compute
 
 METHODS = """
 from dataclasses import dataclass

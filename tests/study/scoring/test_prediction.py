@@ -12,7 +12,7 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.scoring import prediction as predicting
 from tests.study.studies import assert_refused
-from tests.support.trained_study import compute, computed, write
+from tests.support.studies.trained_study import compute, computed, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 3}}")
 METHODS = ('["trained.py:Gain"]', '["trained.py:Gain", "trained.py:Even"]')

@@ -24,8 +24,8 @@ from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
 from tests.study.studies import add_other_profile
-from tests.support.fake_study import fake_work, held, installed, solves, untimed, write_config
 from tests.support.patience import killed_at
+from tests.support.studies.fake_study import fake_work, held, installed, solves, untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

@@ -9,7 +9,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from tests.study.studies import assert_refused, exchanged, tasks_of
-from tests.support.trained_study import compute
+from tests.support.studies.trained_study import compute
 
 CONFIG = """\
 title: "Views"

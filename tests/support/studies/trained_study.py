@@ -16,7 +16,7 @@ from holobench_eval.study.executors import Serial
 from holobench_eval.study.plan import plan
 from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.running.run import Outcome, run
-from tests.support import fake_trained
+from tests.support.studies import fake_trained
 
 CONFIG = """\
 title: "Trained"

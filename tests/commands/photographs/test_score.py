@@ -23,7 +23,7 @@ from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, few, photograph, pose, save
 from tests.support.reports import whole
 
-REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
+REAL = Path(__file__).resolve().parents[3] / "../shared/captures/stanford-2021"
 PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
 SHAPE = (160, 200)
 SPECKLE = {"clean": 0.2, "coarse": 0.6}
