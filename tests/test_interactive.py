@@ -23,6 +23,8 @@ from holobench_eval.report.charts.tiles import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute, write_study
 
+PHASE = (1, 3, 128, 128)  # what a method returns
+
 
 @pytest.fixture(scope="module")
 def display():
@@ -91,22 +93,10 @@ def flat(target, bench, level=0.0):
     return Flat(level).solve(target, bench)
 
 
-@dataclass(frozen=True)
-class Random:
-    """A random phase, as a tensor or as an array of NumPy."""
-
-    array: bool = False
-    double: bool = False
-
-    def solve(self, target, bench):
-        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("phase"))
-        phase = phase.double() / 3 if self.double else phase
-        return phase.numpy() if self.array else phase
-
-
-@pytest.mark.parametrize("double", [False, True])
-def test_a_phase_of_numpy_is_that_of_its_tensor(display, target, double):
-    tensor, array = (display.solve(Random(array, double), target) for array in (False, True))
+@pytest.mark.parametrize("kind", [torch.float32, torch.float64])
+def test_a_phase_of_numpy_is_that_of_its_tensor(display, target, kind):
+    phase = 6 * torch.rand(PHASE, dtype=kind)
+    tensor, array = display.solve(lambda *_: phase, target), display.solve(lambda *_: phase.numpy(), target)
     assert array.dtype == tensor.dtype
     assert np.array_equal(array, tensor)
 
@@ -138,9 +128,8 @@ def test_a_failure_is_one_line_and_has_its_cause(display, target):
     def failing(target, bench):
         raise KeyError("two\nlines")
 
-    with pytest.raises(CellError, match=r"^failing: KeyError: ") as found:
+    with pytest.raises(CellError, match=r"^failing: KeyError: .*$") as found:
         display.solve(failing, target)
-    assert "\n" not in str(found.value)
     assert isinstance(found.value.__cause__, KeyError)
 
 
@@ -204,9 +193,6 @@ def test_counts_of_a_camera_are_linear_light_whatever_their_type(target):
     found = hb.score(counts, target=target, metrics=["psnr"], values="linear")
     assert found == hb.score(counts.astype(np.float64), target=target, metrics=["psnr"])
     assert found["psnr_linear"] > 60
-
-
-PHASE = (1, 3, 128, 128)  # what a method returns
 
 
 @pytest.mark.parametrize(
@@ -283,16 +269,18 @@ def test_a_mistake_is_told_in_one_line(display, target, call, message):
     assert "\n" not in str(found.value)
 
 
-@pytest.mark.parametrize("taken", [0.1, 2.0])
-def test_light_far_below_zero_is_warned_of(target, taken):
-    with pytest.warns(UserWarning, match="darker than the target where it is darkest, by more than 5% of its white"):
-        hb.score(np.asarray(target) - taken, target, metrics=["psnr"])
-
-
-def test_colours_in_another_order_are_warned_of(display):
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda light: light - 0.1, "darker than the target where it is darkest, by more than 5% of its white"),
+        (lambda light: light - 2.0, "darker than the target where it is darkest, by more than 5% of its white"),
+        (lambda light: light[::-1], "red and blue are exchanged in the capture or in its target"),
+    ],
+)
+def test_light_far_below_zero_and_colours_in_another_order_are_warned_of(display, change, said):
     light = display.target(data.astronaut())
-    with pytest.warns(UserWarning, match="red and blue are exchanged in the capture or in its target"):
-        hb.score(np.asarray(light)[::-1], light, metrics=["psnr"])
+    with pytest.warns(UserWarning, match=said):
+        hb.score(change(np.asarray(light)), light, metrics=["psnr"])
 
 
 @pytest.mark.parametrize("kind", ["f4", "f8", ">f4"])
@@ -311,12 +299,6 @@ def test_levels_as_floating_point_are_warned_of_and_light_is_not(display, kind):
         hb.score(part, part, metrics=["psnr"])
 
 
-def test_a_folder_is_no_picture(target, tmp_path):
-    (tmp_path / "a.png").mkdir()
-    with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):
-        hb.compare(target, {"same": target}, tmp_path / "a.png")
-
-
 def test_captures_are_compared_in_a_picture(display, target, tmp_path):
     mirrored, turned = target[:, :, ::-1], target[:, ::-1]
     path = hb.compare(target, {"mirrored": mirrored / 4, "turned": 3 * turned}, tmp_path / "new" / "compared.png")
@@ -333,10 +315,13 @@ def test_captures_are_compared_in_a_picture(display, target, tmp_path):
         assert wrong.mean() < (0.01 if column == 0 else 1e-9)  # the target has a frame around the enlarged window
 
 
-@pytest.mark.parametrize(("ending", "format"), [(".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")])
-def test_the_ending_says_what_a_comparison_is(target, tmp_path, ending, format):
-    path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
-    assert Image.open(path).format == format
+def test_the_ending_says_what_a_comparison_is_and_a_folder_is_none(target, tmp_path):
+    for ending, form in ((".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")):
+        path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
+        assert Image.open(path).format == form
+    (tmp_path / "a.png").mkdir()
+    with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):
+        hb.compare(target, {"same": target}, tmp_path / "a.png")
 
 
 def test_records_of_a_report_are_read():
@@ -426,16 +411,12 @@ def test_what_is_no_phase_is_not_saved(display, target, tmp_path, change, conven
         (0.8, {}, ["the phase has values from 0.00 to 0.80, as turns or amplitudes have"]),
     ],
 )
-def test_a_phase_in_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(
-    tmp_path, turn, convention, says
-):
+def test_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(tmp_path, turn, convention, says):
     phase = turn * np.linspace(0, 0.999, 64 * 64).reshape(1, 64, 64)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         hb.save_levels(phase, tmp_path / "levels.png", **convention)
-    said = [str(each.message) for each in caught]
-    assert len(said) == len(says)
-    assert all(part in line for part, line in zip(says, said, strict=True))
+    assert all(part in str(each.message) for part, each in zip(says, caught, strict=True))
 
 
 def test_an_array_made_like_one_of_a_display_is_plain(display, target):

@@ -5,8 +5,6 @@
 keeps a method from it, and docs/start/trust.md says so). ``calls``: 2 for what one call could do to the next.
 """
 
-from __future__ import annotations
-
 import builtins
 import copy
 import ctypes

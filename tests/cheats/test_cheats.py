@@ -1,7 +1,5 @@
 """What comes of methods that cheat: nothing that another method's digits, or their own, would show."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from pathlib import Path

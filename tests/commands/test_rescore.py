@@ -18,12 +18,12 @@ from holobench_eval.study import executors, identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import parted
 from holobench_eval.study.phases import phases_of
-from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
 from tests.commands.photographs import test_moved_session as sessions
 from tests.lab.session.running import run, succeed
 from tests.study.running.test_rescore import BOTH, ONE, PICTURE, cells, forget
+from tests.study.studies import planned
 from tests.support.studies import another_metric
 from tests.support.studies.another_metric import COLUMN, NAME
 from tests.support.studies.trained_study import compute
@@ -78,7 +78,7 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
     pd.testing.assert_frame_equal(after[list(before)], before)
     assert problems_in(report) == (1, [])
     store = Store(report)  # which has one record and one capture for each cell
-    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in plan(load_study(config)).cells}
+    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in planned(config).cells}
     assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
 
 
@@ -120,7 +120,7 @@ def test_a_metric_more_in_the_package_is_no_problem_of_a_report(tmp_path, add, n
     build_report(load_study(config), outcome.records, folder, outcome.provenance)
     assert problems_in(folder) == (1, [])
     add(1)
-    assert NAME in plan(load_study(config)).metrics
+    assert NAME in planned(config).metrics
     assert problems_in(folder) == (1, [])
 
 

@@ -12,11 +12,11 @@ from holobench_eval.commands.options import ARTIFACTS, learned_folder
 from holobench_eval.commands.solve import _entries, _study, solve
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import shipped_configs
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import plan
+from tests.study.studies import planned
 
 FUNCTION = '''
 import torch
+from tests.study.studies import planned
 
 
 def flat(target, bench):
@@ -37,14 +37,11 @@ def picture(tmp_path, monkeypatch, in_process):
 def test_several_methods_give_phases_captures_scores_and_a_picture(picture, capsys):
     Path("mine.py").write_text(FUNCTION)
     solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128))
-    folder = Path("holoeval-results", "my picture")
-    printed = capsys.readouterr().out
+    folder, printed = Path("holoeval-results", "my picture"), capsys.readouterr().out.replace("\n", "")
     for path in ("figures/answer-pictures.jpg", "phases/double_phase", "captures/flat"):
-        assert str(folder / path) in printed.replace("\n", "")
+        assert str(folder / path) in printed
         assert (folder / path).exists()
-    table = pd.read_csv(folder / "table.csv")
-    assert set(table["label"]) >= {"double_phase", "flat"}
-    assert (folder / "study.yaml").is_file()
+    assert set(pd.read_csv(folder / "table.csv")["label"]) >= {"double_phase", "flat"}
 
 
 def test_what_table_3_trained_serves_to_solve(picture):
@@ -52,8 +49,8 @@ def test_what_table_3_trained_serves_to_solve(picture):
     Path("out/picture").mkdir(parents=True)
     picture.rename(Path("out/picture") / picture.name)
     config.write_text(_study(["hil"], Path("out/picture") / picture.name, "leto-2020", (256, 256), Path("out")))
-    (own,) = plan(load_study(config)).preparations()
-    assert own in plan(load_study(shipped_configs()["table3"])).preparations()
+    (own,) = planned(config).preparations()
+    assert own in planned(shipped_configs()["table3"]).preparations()
 
 
 def test_parameters_are_set_of_each_method_or_of_one(picture):
@@ -67,7 +64,7 @@ def test_parameters_are_set_of_each_method_or_of_one(picture):
 
 
 def test_the_networks_of_the_clone_are_found_from_any_folder(tmp_path, monkeypatch):
-    grid, root = plan(load_study(shipped_configs()["table3"])), Path(__file__).parents[2]
+    grid, root = planned(shipped_configs()["table3"]), Path(__file__).parents[2]
     monkeypatch.chdir(tmp_path)
     assert learned_folder(ARTIFACTS, grid) == root / "artifacts"
     assert learned_folder(Path("mine"), grid) == Path("mine")

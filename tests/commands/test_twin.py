@@ -1,7 +1,5 @@
 """One command makes a twin of a display, and says how far it can stand for that."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path
@@ -9,7 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from holobench_eval.commands import main
 from holobench_eval.commands.twin import twin
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
@@ -91,7 +88,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(quick, 
         (["ideal", "-o", "lab", "--network", "nothing"], "'nothing' cannot be a display; expected a method of this"),
     ],
 )
-def test_what_cannot_be_is_one_line(arguments, fault, tmp_path, monkeypatch, capsys):
+def test_what_cannot_be_is_one_line(arguments, fault, tmp_path, monkeypatch, call):
     folder = tmp_path / "mine"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -101,12 +98,8 @@ def test_what_cannot_be_is_one_line(arguments, fault, tmp_path, monkeypatch, cap
     Path("mine.yaml").write_text("like: leto-aged\nname: mine\n")
     Path("eye.yaml").write_text("like: leto-2020\nname: eye\neye: {focus: [0.2, 0, 0], known: true}\n")
     Path("bench.yaml").write_text("name: mine\nslm: {}\n")
-    monkeypatch.setattr("sys.argv", ["holoeval", "twin", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    printed = capsys.readouterr().err
-    assert ended.value.code == 2
-    assert printed.count("\n") == 1
+    code, _, printed = call("twin", *arguments)
+    assert (code, printed.count("\n")) == (2, 1)
     assert fault in printed
     assert not list(folder.rglob("photographs.yaml"))  # so that the next call is not refused
     assert Path("mine.yaml").read_text() == "like: leto-aged\nname: mine\n"

@@ -1,7 +1,5 @@
 """What a virtual camera counts by itself, and what is reported: for each target, and for the training."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A study that is hit by faults becomes what it is without one; ``python -m tests.faults`` does the same for long."""
 
-from __future__ import annotations
-
 import os
 import random
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every target reads damaged input or refuses it; ``python -m tests.fuzz`` does the same for long."""
 
-from __future__ import annotations
-
 import random
 from contextlib import suppress
 

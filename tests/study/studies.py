@@ -1,15 +1,14 @@
 """Small studies for tests: a config in a few words, and texts with pieces exchanged."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.plan import Plan, Task, plan
@@ -49,18 +48,31 @@ def exchanged(text: str, *changes: tuple[str, str]) -> str:
     return text
 
 
+@contextmanager
+def one_line(*words: str) -> Iterator[None]:
+    """What comes is refused in one line that holds the words."""
+    with pytest.raises((UserError, CellError)) as refused:
+        yield
+    line = str(refused.value)
+    assert [word for word in words if word not in line] == [], line
+    assert "\n" not in line
+
+
 def assert_refused(config: Path, message: str) -> None:
     """A config is refused in one line that begins with its place, as the message does, and the reason."""
-    with pytest.raises(UserError) as refused:
+    with one_line(f"{config}:{message}"):
         load_study(config)
-    assert str(refused.value).startswith(f"{config}:{message}")
-    assert "\n" not in str(refused.value)
+
+
+def planned(config: Path) -> Plan:
+    """What a config plans."""
+    return plan(load_study(config))
 
 
 def tasks_of(config: Path) -> dict[str, list[Task]]:
     """The tasks of every method of a study, by its label."""
     tasks: dict[str, list[Task]] = {}
-    for task in plan(load_study(config)).tasks:
+    for task in planned(config).tasks:
         tasks.setdefault(task.label, []).append(task)
     return tasks
 
@@ -97,8 +109,9 @@ def compute(
     write: Callable[[str], None] = lambda line: None,
     executor: Executor | None = None,
     grid: Plan | None = None,
+    artifacts: Path | None = None,
     **options: Any,
 ) -> Outcome:
-    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder."""
-    study, artifacts = load_study(config), output.parent / "artifacts"
-    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, artifacts, **options)
+    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder unless said."""
+    study, trained = load_study(config), artifacts or output.parent / "artifacts"
+    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, trained, **options)

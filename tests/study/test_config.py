@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -8,26 +6,9 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study.changes import Changes
 from holobench_eval.study.config import load_study
 from tests.study.studies import assert_refused, exchanged
+from tests.support import plugins
 
-DATASETS = """
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
-
-from annotated_types import Interval
-
-
-@dataclass(frozen=True)
-class Images:
-    count: Annotated[int, Interval(ge=0)] = 2
-
-    def items(self):
-        return [f"image {i}" for i in range(self.count)]
-
-
-@dataclass(frozen=True)
-class Training(Images):
-    training: ClassVar[bool] = True
-"""
+DATASETS = plugins.text("sets")
 
 FULL = """\
 title: "A study"
@@ -86,7 +67,7 @@ def test_defaults_are_filled_in(tmp_path):
     assert (study.methods[0].profiles, study.methods[0].params["iterations"]) == (("ideal",), 200)
 
 
-CHANGES = [
+STRUCTURE = [
     ("seed: 7", "sede: 7", "2:1: unknown key 'sede' in the document; did you mean 'seed'?"),
     ("seed: 7", "seed: -1", "2:7: seed should be greater than or equal to 0, got -1"),
     ("seed: 7", "seed: .nan", "2:7: '.nan' is not a finite number"),
@@ -95,28 +76,36 @@ CHANGES = [
     ('title: "A study"\n', "", "1:1: missing key 'title'"),
     ("profiles: [ideal]\n", "profiles: []\n", "4:13: display.profiles"),
     ("profiles: [ideal]\n", "profiles: [idel]\n", "4:14: unknown profile 'idel'; did you mean 'ideal'?"),
-    ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
-    ("profiles: [ideal]\n", "profiles: [absent.yaml]\n", "4:14: profile 'absent.yaml': no such file"),
     ("panel: [128, 256]", "panel: [32, 256]", "5:11: display.panel[0] should be greater than or equal to 64, got 32"),
-    ("panel: [128, 256]", "panel: [1920, 1080]", "4:14: 'ideal' has 1080 rows and 1920 columns; rows come first: "),
     ("panel: [128, 256]", "panel: [128]", "5:10: display.panel has too few values"),
-    ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels of this panel; "),
     ("  panel: [128, 256]", "\tpanel: [128, 256]", "5:1: a tab, which YAML does not take here; use spaces"),
     ("- wirtinger", "- {name: sgd, params: {privileged: true}}", "9:26: method 'sgd': 'privileged' is no parameter; "),
     ("exposure: matched", "exposure: bright", "6:13: display.exposure should be 'equal' or 'matched'"),
     ("sets.py:Images", "phtographs", "7:20: unknown dataset 'phtographs'; did you mean 'photographs'?"),
+    ("- wirtinger", "- wirtinker", "9:5: unknown method 'wirtinker'; did you mean 'wirtinger'?"),
+    ("- wirtinger", "- 3", "9:5: methods[0] should be a mapping"),
+    ("iterations: 12", "itterations: 12", "10:52: method 'gerchberg_saxton' has no parameter 'itterations'"),
+    ("iterations: 12", "iterations: 0", "10:64: method 'gerchberg_saxton': parameter 'iterations': input should be"),
+    ("params: {iterations: 12}", "grid: {iterations: [1, 0]}", "10:62: method 'gerchberg_saxton': parameter"),
+    ("params: {iterations: 12}", "grid: {iterations: []}", "10:62: methods[1].grid.iterations"),
+    ("repeats: 2", "timing: serial", "11:9: timing should be 'shared' or 'alone', got \"serial\""),
+    ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),
+    ("captures: true", "captures: 1", "14:18: save.captures should be a valid boolean"),
+    ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
+    ("repeats: 2", "protocol: {version: v1}", "11:21: protocol.version should be 'v2'"),
+    ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
+]
+BEYOND = [  # structure: mistakes about other values, files, images and optics, which the schema cannot find
+    ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
+    ("profiles: [ideal]\n", "profiles: [absent.yaml]\n", "4:14: profile 'absent.yaml': no such file"),
+    ("panel: [128, 256]", "panel: [1920, 1080]", "4:14: 'ideal' has 1080 rows and 1920 columns; rows come first: "),
+    ("panel: [128, 256]", "panel: [64, 64]", "5:10: 'ideal' scores a window of 52 x 52 pixels of this panel; "),
     ("sets.py:Images", "sets.py:Training", "7:20: dataset 'sets.py:Training' holds training images"),
     ("sets.py:Images", "gone.py:Images", "7:20: dataset 'gone.py:Images': no such file"),
     ("count: 3", "cuont: 3", "7:47: dataset 'sets.py:Images' has no parameter 'cuont'; did you mean 'count'?"),
     ("count: 3", "count: -3", "7:54: dataset 'sets.py:Images': parameter 'count'"),
     ("count: 3", "count: 0", "7:20: dataset 'sets.py:Images' has no images"),
-    ("- wirtinger", "- wirtinker", "9:5: unknown method 'wirtinker'; did you mean 'wirtinger'?"),
-    ("- wirtinger", "- 3", "9:5: methods[0] should be a mapping"),
-    ("iterations: 12", "itterations: 12", "10:52: method 'gerchberg_saxton' has no parameter 'itterations'"),
-    ("iterations: 12", "iterations: 0", "10:64: method 'gerchberg_saxton': parameter 'iterations': input should be"),
     ("profiles: [ideal]}", "profiles: [idael]}", "10:80: 'idael' is not in display.profiles; did you mean 'ideal'?"),
-    ("params: {iterations: 12}", "grid: {iterations: [1, 0]}", "10:62: method 'gerchberg_saxton': parameter"),
-    ("params: {iterations: 12}", "grid: {iterations: []}", "10:62: methods[1].grid.iterations"),
     ("params: {iterations: 12}", "grid: {iterations: [3, 3]}", "10:49: two rows are named 'GS, iterations 3'; list"),
     ('label: "GS"', "grid: {iterations: [3]}", "10:37: 'iterations' stands in params, too; keep one of the two"),
     ('label: "GS"', 'label: "Wirtinger "', "10:37: methods[1] and methods[0] share the label 'Wirtinger ', but"),
@@ -124,16 +113,10 @@ CHANGES = [
     ('label: "GS"', "label: floor_black", "10:37: label 'floor_black' should be"),
     ('label: "GS"', "label: floor", "10:37: label 'floor' should be"),
     ('label: "GS"', 'label: "a\\nb"', "10:37: label 'a\\nb' should be printable"),
-    ("repeats: 2", "timing: serial", "11:9: timing should be 'shared' or 'alone', got \"serial\""),
     ("baseline: GS", "baseline: gs", "12:11: no method has the label 'gs'; "),
-    ("headline: ssim_srgb", "headline: ssim_sgrb", "13:11: unknown metric 'ssim_sgrb'; did you mean 'ssim_srgb'?"),
-    ("captures: true", "captures: 1", "14:18: save.captures should be a valid boolean"),
     ("GS: {psnr", "gS: {psnr", "15:38: no method has the label 'gS'"),
     ("rows: {GS", "beside: idael, rows: {GS", "15:39: 'idael' is not in display.profiles; did you mean 'ideal'?"),
-    ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
-    ("repeats: 2", "protocol: {version: v1}", "11:21: protocol.version should be 'v2'"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
-    ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),
     ("repeats: 2", "related: [absent]", "11:11: "),
     ("repeats: 2", "related: [study]", "11:11: 'study' measures no predictions; name an error budget or"),
@@ -142,7 +125,7 @@ CHANGES = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "message"), CHANGES)
+@pytest.mark.parametrize(("old", "new", "message"), STRUCTURE + BEYOND)
 def test_a_mistake_is_one_line_at_its_place(tmp_path, old, new, message):
     assert old in FULL
     assert_refused(write(tmp_path, FULL.replace(old, new, 1)), message)

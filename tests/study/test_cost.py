@@ -1,11 +1,10 @@
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
 import weakref
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ import pytest
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.studies import add_other_profile
+from tests.study.studies import add_other_profile, planned
 from tests.support.studies.fake_study import write_config
 
 ROOT = Path(__file__).parents[2]
@@ -75,15 +74,9 @@ def test_without_the_linux_files_time_alone_is_measured(tmp_path, monkeypatch):
     assert taken.seconds >= 0
 
 
-class Node:
-    """Something that can hold itself."""
-
-    own: Node
-
-
 def test_what_a_solution_left_in_circles_is_let_go_before_the_next():
     cost.start().stop()
-    left = Node()
+    left = SimpleNamespace()
     left.own = left
     seen = weakref.ref(left)
     del left
@@ -135,7 +128,7 @@ def test_every_row_of_the_tables_is_timed_by_its_last_solution_of_the_first_repe
 
 
 def test_targets_share_a_time_and_threads_workers_and_methods_do_not(tmp_path):
-    first, second = plan(load_study(write_config(tmp_path))).tasks[-2:]
+    first, second = planned(write_config(tmp_path)).tasks[-2:]
     assert first.cells[0].target != second.cells[0].target
     assert cost.key(first, 1, 1) == cost.key(second, 1, 1) == cost.key(replace(first, label="renamed"), 1, 1)
     other = replace(first, cells=(replace(first.cells[0], phase={**first.cells[0].phase, "code": "changed"}),))

@@ -1,7 +1,5 @@
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
+from unittest.mock import MagicMock, PropertyMock
 
 import pytest
 
@@ -16,12 +14,6 @@ from holobench_eval.study.plan import Task, plan
 from tests.support.studies.fake_study import write_config
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
-
-
-class Uncalibrated:
-    @property
-    def registration(self) -> Any:
-        raise CellError("no circles found")
 
 
 def test_a_condition_tells_a_profile_at_the_panel_of_the_study(tmp_path):
@@ -41,17 +33,13 @@ def test_a_profile_that_changes_under_a_run_is_refused(tmp_path):
 
 def test_a_failed_calibration_is_found_out_once(tmp_path, monkeypatch):
     (tmp_path / "mine.yaml").write_text(TEXT)
-    shown, opened = condition("mine.yaml", (128, 128), tmp_path), []
-
-    def open_bench(*_: Any, **__: Any) -> Uncalibrated:
-        opened.append(1)
-        return Uncalibrated()
-
-    monkeypatch.setattr(opening, "open_bench", open_bench)
+    shown, bench = condition("mine.yaml", (128, 128), tmp_path), MagicMock()
+    type(bench.return_value).registration = PropertyMock(side_effect=CellError("no circles found"))
+    monkeypatch.setattr(opening, "open_bench", bench)
     for _ in range(2):
         with pytest.raises(CellError, match="no circles found"):
             open_display(shown, seed=0)
-    assert len(opened) == 1
+    bench.assert_called_once()
 
 
 SWEEPS = """sweeps:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Mapping
@@ -14,15 +12,15 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.core.io import file_name, write_atomically
 from holobench_eval.study import identity
 from holobench_eval.study import store as store_module
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.plan import Cell, Plan
 from holobench_eval.study.store import SCHEMA, Record, Store, appears
+from tests.study.studies import planned
 from tests.support.studies.fake_study import write_config
 
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory):
-    return plan(load_study(write_config(tmp_path_factory.mktemp("study"), count=1)))
+    return planned(write_config(tmp_path_factory.mktemp("study"), count=1))
 
 
 @pytest.fixture
@@ -43,8 +41,7 @@ def test_a_record_is_read_as_it_was_written_and_an_absent_one_is_none(store, gri
     record = record_of(grid, scores=psnr(20.123456789012345), captures=3, seconds=0.1, saturated=1e-9)
     assert store.read(record.id) is None
     store.write(record)
-    assert store.read(record.id) == record
-    assert record.id == grid.cells[-1].id
+    assert (store.read(record.id), record.id) == (record, grid.cells[-1].id)
 
 
 def edited(content: dict[str, Any], **entries: Any) -> str:
@@ -102,11 +99,12 @@ def test_a_damaged_record_is_named(store, grid, fault):
     assert len(str(error.value)) < 400
 
 
-def test_cells_without_a_record_are_missing_and_records_of_other_studies_are_left_alone(store, grid):
-    store.write(record_of(grid))
+def test_cells_without_a_record_are_missing_records_have_the_name_of_their_plan_and_others_are_left_alone(store, grid):
+    store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
     (store.folder / "foreign.json").write_text("nothing")
-    states = [record["state"] for record in store.load(grid)]
-    assert states == ["missing"] * 5 + ["done"]
+    found = store.load(grid)
+    assert [record["state"] for record in found] == ["missing"] * 5 + ["done"]
+    assert [record["label"] for record in found] == [label for label, _ in grid.labelled()]
 
 
 @pytest.mark.parametrize(
@@ -156,15 +154,9 @@ def test_different_names_get_different_files(one, other):
 def test_a_failure_never_replaces_a_score(store, grid):
     done = record_of(grid, scores=psnr(20.0))
     failed = Record(done.capture, "failed", "Toy", "ZeroDivisionError")
-    store.write(failed)
-    store.write(done)
-    store.write(failed)
+    for record in (failed, done, failed):
+        store.write(record)
     assert store.read(done.id) == done
-
-
-def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(store, grid):
-    store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
-    assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
 
 
 def test_the_state_of_a_cell_is_that_of_its_record_unless_it_is_to_be_timed_or_scored(store, grid):

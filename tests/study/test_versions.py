@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Callable
@@ -44,27 +42,14 @@ def test_a_shipped_method_is_named_by_its_declared_version(monkeypatch):
     assert method_version(Wirtinger) == "Wirtinger 2"
 
 
-MINE = """
-from dataclasses import dataclass
-from holobench_eval.methods.wirtinger import Wirtinger
-
-@dataclass(frozen=True)
-class Method(Wirtinger):
-    pass
-"""
+MINE = "from holobench_eval.methods.wirtinger import Wirtinger\n\nclass Method(Wirtinger): ...\n"
 
 
 def version(folder: Path, name: str = "Method") -> str:
     return method_version(plugins.find("methods", f"mine.py:{name}", folder))
 
 
-CALLING = """
-from holobench_eval.methods.wirtinger import Wirtinger
-
-
-def Method(target, bench):
-    return Wirtinger().solve(target, bench)
-"""
+CALLING = MINE.replace("class Method(Wirtinger): ...", "def Method(*given):\n    return Wirtinger().solve(*given)")
 
 
 @pytest.mark.parametrize("text", [MINE, CALLING])

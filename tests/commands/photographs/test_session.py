@@ -53,7 +53,7 @@ def table(folder: Path) -> pd.DataFrame:
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("session")
     config = folder / "study.yaml"
-    config.write_text(STUDY)
+    config.write_text(STUDY.replace("count: 2", "count: 1"))
     said = run("session", "export", config, folder / "bench")
     Lab("leto-mild", (144, 144), seed=1).photograph_round(folder / "bench", 1)
     return folder, said
@@ -86,13 +86,12 @@ def test_photographs_through_files_score_as_the_direct_run_does_and_are_read_onc
     folder, said = exported
     assert "round 1" in said
     run("session", "import", folder / "bench")
-    assert "0 of 16 cells to compute" in run("session", "import", folder / "bench")
+    assert "0 of 7 cells to compute" in run("session", "import", folder / "bench")
     run("run", folder / "study.yaml", "--output", folder / "direct", "--executor", "serial")
     ours, direct = table(folder / "bench" / "report"), table(folder / "direct")
-    for method in ("double_phase", "wirtinger"):
-        row = (method, "leto-mild")
-        assert ours.loc[row, "psnr_linear_db"] == pytest.approx(direct.loc[row, "psnr_linear_db"], abs=0.1)
-        assert ours.loc[row, "ssim_linear"] == pytest.approx(direct.loc[row, "ssim_linear"], abs=0.01)
+    for row in (("double_phase", "leto-mild"), ("wirtinger", "leto-mild")):
+        for column, error in (("psnr_linear_db", 0.1), ("ssim_linear", 0.01)):
+            assert ours.loc[row, column] == pytest.approx(direct.loc[row, column], abs=error)
     run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site", "--own", folder)
     titles = {
         name: re.findall(r"<h2>(leto-mild.*)</h2>", (folder / "site" / "studies" / f"{name}.html").read_text())
@@ -151,17 +150,9 @@ def outside(path: Path) -> None:
         ("hologram", Path.unlink, "missing: captures/round-1/{}"),
         ("hologram", lambda path: save(path, counts(path)[:-2]), "wrong size: captures/round-1/{}"),
         ("hologram", lambda path: save(path, counts(path) | 0xFFFF), "of captures/round-1/{} is at 65535 counts"),
-        (
-            "hologram",
-            lambda path: save(path, (counts(path) >> 8).astype(np.uint8)),
-            "another kind of file: captures/round-1/{}",
-        ),
+        ("hologram", lambda path: save(path, (counts(path) >> 8).astype(np.uint8)), "another kind of file: captures/"),
         ("hologram", outside, "leads out of the session folder"),
-        (
-            "dark",
-            lambda path: save(path, counts(captures(path.parents[2], "hologram")[3]) + 1),
-            "captures/round-1/{} should be dark",
-        ),
+        ("dark", lambda path: save(path, counts(captures(path.parents[2], "hologram")[3]) + 1), "{} should be dark"),
     ],
 )
 def test_a_photograph_that_cannot_be_is_named(photographed, role, spoil, line):
@@ -241,12 +232,10 @@ def test_what_cannot_be_photographed_is_refused_or_left_out(tmp_path, change, sa
 
 
 def test_a_folder_from_elsewhere_runs_no_code_and_reads_no_folder_of_its_own_accord(photographed):
+    manifest = json.loads((photographed / "manifest.json").read_text())
     for line in ("  - /tmp/evil.py:Method\n", "  - evil.py:Method\n"):
-        text = STUDY + line
-        (photographed / "study.yaml").write_text(text)
-        manifest = json.loads((photographed / "manifest.json").read_text())
-        manifest["study_sha256"] = digest(text)
-        (photographed / "manifest.json").write_text(json.dumps(manifest))
+        (photographed / "study.yaml").write_text(STUDY + line)
+        (photographed / "manifest.json").write_text(json.dumps(manifest | {"study_sha256": digest(STUDY + line)}))
         assert "give --study with your own copy" in wrong(photographed)
 
 
@@ -260,7 +249,7 @@ ROUNDS = """\
 title: A study in rounds
 seed: 3
 display: {profiles: [green.yaml], panel: [128, 128]}
-targets: {dataset: photographs, params: {count: 2}}
+targets: {dataset: photographs, params: {count: 1}}
 training: {dataset: dead_leaves, params: {count: 3}, held_out: 1}
 protocol: {metrics: [psnr]}
 methods:
@@ -268,15 +257,13 @@ methods:
   - name: parametric_model
     params:
       patterns: 2
-      training: {rounds: 2, images: 2, refine_images: 1, steps: 200, refine_steps: 100}
+      training: {rounds: 2, images: 2, refine_images: 1, steps: 60, refine_steps: 30}
       search: {iterations: 4}
       retrieval: {iterations: 8}
 """
 
 
-def test_methods_that_learn_and_methods_with_a_camera_go_round_by_round_to_the_direct_scores(
-    tmp_path, averaged, monkeypatch
-):
+def test_learning_and_watching_methods_go_round_by_round_to_the_direct_scores(tmp_path, averaged, monkeypatch):
     monkeypatch.setattr(patterns, "Wirtinger", partial(Wirtinger, iterations=5))
     config, folder, profile = tmp_path / "study.yaml", tmp_path / "bench", write_green(tmp_path, "leto-aged")
     config.write_text(ROUNDS)
@@ -291,10 +278,9 @@ def test_methods_that_learn_and_methods_with_a_camera_go_round_by_round_to_the_d
     run("run", config, "--output", tmp_path / "direct", "--executor", "serial", "--artifacts", tmp_path / "artifacts")
     ours, direct = table(folder / "report"), table(tmp_path / "direct")
     for method in ("online_camera", "parametric_model"):
-        row = (method, "green")
+        row, counted = (method, "green"), ["captures", "training_captures"]
         assert ours.loc[row, "psnr_linear_db"] == pytest.approx(direct.loc[row, "psnr_linear_db"], abs=0.3)
-        assert ours.loc[row, "captures"] == direct.loc[row, "captures"]
-        assert ours.loc[row, "training_captures"] == direct.loc[row, "training_captures"]
+        assert ours.loc[row, counted].equals(direct.loc[row, counted])
 
 
 def test_an_export_that_was_interrupted_goes_on_with_import(tmp_path):

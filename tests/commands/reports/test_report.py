@@ -17,22 +17,24 @@ def committed(made):
     return made.parents[1] / "study.yaml", made
 
 
-def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_and_nothing_else_changes(
+def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_alone(
     committed,
 ):
     config, folder = committed
-    before = json.loads((folder / "provenance.json").read_text())
-    records = (folder / "records.csv").read_bytes()
-    tables = (folder / "table.csv").read_bytes()
+
+    def tables() -> list[bytes]:
+        return [(folder / name).read_bytes() for name in ("records.csv", "table.csv")]
+
+    before, known = tables(), json.loads((folder / "provenance.json").read_text())
     config.write_text(f"{config.read_text()}question: What does Toy score?\n")
     assert len(problems_in(folder)[1]) == 1
 
     report(config, folder)
-    assert "What does Toy score?" in (folder / "report.md").read_text()
-    assert "(figures/answer-pictures.jpg)" in (folder / "report.md").read_text()
-    assert ((folder / "records.csv").read_bytes(), (folder / "table.csv").read_bytes()) == (records, tables)
+    text = (folder / "report.md").read_text()
+    assert all(words in text for words in ("What does Toy score?", "(figures/answer-pictures.jpg)"))
+    assert tables() == before
     after = json.loads((folder / "provenance.json").read_text())
-    assert {key for key in before if before[key] != after[key]} == {"config_sha256"}
+    assert {key for key in known if known[key] != after[key]} == {"config_sha256"}
     assert problems_in(folder)[1] == []
 
     config.write_text(config.read_text().replace("- plugins.py:Toy", '- {name: "plugins.py:Toy", label: Anew | <b>}'))

@@ -1,7 +1,5 @@
 """A family of displays: its draws, what figures leave of them, and the displays that are kept."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields, replace
 from pathlib import Path

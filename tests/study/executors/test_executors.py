@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -38,11 +36,10 @@ def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(tmp_pa
     serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", lose_a_worker)
     local = compute(config, tmp_path / "local", Local(2))
-    lost = [record["state"] == "failed" for record in local]
-    assert [record["cell"]["target"] for record, gone in zip(local, lost, strict=True) if gone] == ["gray 1"]
-    assert all(record["reason"].startswith("KilledWorker") for record in local if record["state"] != "done")
-    kept = [record for record, gone in zip(serial, lost, strict=True) if not gone]
-    assert untimed([record for record in local if record["state"] == "done"]) == untimed(kept)
+    (lost,) = (number for number, record in enumerate(local) if record["state"] != "done")
+    gone = local.pop(lost)
+    assert (gone["state"], gone["cell"]["target"], gone["reason"][:12]) == ("failed", "gray 1", "KilledWorker")
+    assert untimed(local) == untimed(serial[:lost] + serial[lost + 1 :])
 
 
 @pytest.mark.slow
@@ -93,9 +90,7 @@ def endless(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_an_error_is_the_result_of_its_job(
-    tmp_path, monkeypatch
-):
+def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_return_errors(tmp_path, monkeypatch):
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.chdir(tmp_path)
@@ -144,15 +139,9 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path):
         except KeyboardInterrupt:
             print("seen")
     """
-    run = subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    run = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment, start_new_session=True, **pipes)
     wait_until((tmp_path / "importing").exists)
     os.killpg(run.pid, signal.SIGINT)
     assert run.communicate(timeout=PATIENCE) == ("seen\n", "")
@@ -171,29 +160,21 @@ def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_serve
         assert (other.exitcode, server._forkserver_pid) == (0, before)
 
 
-NEEDY = [("local", None, False), ("auto", None, True), ("auto", 2, False)]
-OTHERS = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial", None, True), ("slurm", 4, True)]
-
-
-@pytest.mark.parametrize("chosen", [*NEEDY, *OTHERS])
-def test_workers_are_prepared_only_where_they_are_needed(chosen, monkeypatch):
-    begun: list[bool] = []
-    monkeypatch.setattr(executors, "prepare", lambda: begun.append(True))
+def test_workers_are_prepared_only_where_they_are_needed(monkeypatch):
+    needy = [("local", None, False), ("auto", None, True), ("auto", 2, False)]
+    others = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial", None, True), ("slurm", 4, True)]
+    begun: list[Any] = []
     monkeypatch.setattr(executors, "_cores", lambda: 2)
-    executors.begin(*chosen)
-    assert bool(begun) == (chosen in NEEDY)
+    for chosen in needy + others:
+        monkeypatch.setattr(executors, "prepare", lambda: begun.append(chosen))  # noqa: B023
+        executors.begin(*chosen)
+    assert begun == needy
 
 
 def test_the_serial_executor_takes_a_job_when_it_starts_it():
     taken: list[int] = []
-
-    def jobs() -> Any:
-        for number in range(3):
-            taken.append(number)
-            yield number
-
-    results = Serial().map(lambda number: number * 2, jobs())
-    assert next(results) == (0, 0)
+    jobs = (taken.append(number) or number for number in range(3))
+    assert next(Serial().map(lambda number: number * 2, jobs)) == (0, 0)
     assert taken == [0]
 
 

@@ -1,7 +1,5 @@
 """What a method takes in a process of its own is measured from outside, whatever the process does about it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A method whose code or files were edited is another one, however it is written."""
 
-from __future__ import annotations
-
 import sys
 import tokenize
 from collections.abc import Callable
@@ -101,9 +99,9 @@ FORMS = {
 
 
 def write(folder: Path, form: Form) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("mine.py", form.main), form.other):
         if name:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text)
 
 
@@ -177,7 +175,7 @@ PARTS = {  # where a number may be
 }
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.data())
 def test_any_token_that_is_edited_makes_another_method(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("random")
@@ -214,21 +212,18 @@ def test_what_is_refused_says_why(tmp_path):
         inside(tmp_path)
 
 
-LIBRARY = "def late():\n    import beside_\n    return beside_.NAME\n"
-
-
 def test_a_module_beside_is_what_the_file_imports_and_no_library(tmp_path, monkeypatch):
     installed, own = tmp_path / "installed", tmp_path / "own"
     for folder in (installed, own):
         folder.mkdir()
         (folder / "beside_.py").write_text(f"NAME = '{folder.name}'")
-    (installed / "library_.py").write_text(LIBRARY)
+    (installed / "library_.py").write_text("def late():\n    import beside_\n    return beside_.NAME\n")
     monkeypatch.syspath_prepend(installed)
     for name in ("types", "holobench_eval"):
         (own / f"{name}.py").write_text("raise SystemExit")
-    top = "import types, holobench_eval.core, library_\nFIRST = library_.late()\ndel library_.sys\nimport beside_"
+    top = "import sys, types, holobench_eval.core, library_\nFIRST = library_.late()\ndel sys.modules['beside_']\n"
     solve = "    def solve(self, target, bench):\n        return FIRST, beside_.NAME\n"
-    write(own, of_class(solve, top.replace("del library_.sys", "import sys\ndel sys.modules['beside_']")))
+    write(own, of_class(solve, f"{top}import beside_"))
     assert inside(own).solve(0, None) == ("installed", "own")
     monkeypatch.delitem(sys.modules, "library_")
 
@@ -236,7 +231,6 @@ def test_a_module_beside_is_what_the_file_imports_and_no_library(tmp_path, monke
 def test_two_folders_with_a_helper_of_one_name_have_each_their_own(tmp_path):
     methods = []
     for number, name in enumerate(("a", "b")):
-        (tmp_path / name).mkdir()
         write(tmp_path / name, FORMS["helper, absolute"])
         (tmp_path / name / "helper.py").write_text(SCALED.replace("1.0", str(number)))
         methods.append(inside(tmp_path / name))
@@ -250,20 +244,19 @@ def test_the_name_in_the_file_counts(tmp_path):
 
 
 def test_a_module_of_the_studys_folder_is_code_of_all_that_import_it(tmp_path, monkeypatch):
-    (tmp_path / "lib").mkdir()
     library = tmp_path / "lib" / "library_of_a_study.py"
+    library.parent.mkdir()
     library.write_text(SCALED)
-    monkeypatch.syspath_prepend(tmp_path / "lib")
+    monkeypatch.syspath_prepend(library.parent)
 
     def versions() -> list[str]:
         names = [f"methods/{name}.py:Mine" for name in ("a", "b", "a")]
         return [method_version(plugins.find("methods", name, tmp_path)) for name in names]
 
+    (tmp_path / "methods").mkdir()
     for name in ("a", "b"):
-        (tmp_path / "methods").mkdir(exist_ok=True)
-        (tmp_path / "methods" / f"{name}.py").write_text(
-            of_class(SOLVE, "from library_of_a_study import scaled").main + f"# {name}"
-        )
+        text = of_class(SOLVE, "from library_of_a_study import scaled").main
+        (tmp_path / "methods" / f"{name}.py").write_text(f"{text}# {name}")
     first, other, again = versions()
     assert first == again != other
     assert method_version(isolation.find("methods/b.py:Mine", tmp_path)) == other

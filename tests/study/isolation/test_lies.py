@@ -1,7 +1,5 @@
 """What a method's process says of itself, right or wrong, is taken or refused in one line."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -16,27 +14,9 @@ from holobench_eval.study.definition import Limits
 from holobench_eval.study.isolation import read_files
 from holobench_eval.study.isolation.messages import Channel
 from holobench_eval.study.versions import method_version
+from tests.support import plugins
 
-METHOD = """
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Mine:
-    level: float = 1.0
-
-    def solve(self, target, bench):
-        return target
-
-    def available(self):
-        return None
-
-    def files(self, target):
-        return []
-
-    def external(self):
-        return {}
-"""
+METHOD = plugins.text("plain")
 NUL, ESCAPE, HALF = "\0", "\x1b[31m", "\ud800"  # no text for a system, for a terminal, for a file
 FACTS: dict[str, list[Any]] = {
     "name": [NUL, "", 3, "x" * 10**6, HALF, ESCAPE],
@@ -63,7 +43,6 @@ RESULTS: dict[str, list[Any]] = {
     "external": [3, [], {"a": 3}, {3: "a"}, {"a": "\0"}],
 }
 NUMBERS = ["x", 10**30, None, [1], math.nan]
-Lie = Callable[[Callable[[Any], Any]], None]
 RECEIVE, SEND = Channel.receive, Channel.send
 
 

@@ -1,24 +1,21 @@
 """What a method's calls read is known: by digest where the study can be held to it, else by name."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from multiprocessing import Pipe
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 import torch
 
-from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU
 from holobench_eval.core.reads import STARTED, Seen
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation.messages import Channel, GarbledError
 from holobench_eval.study.isolation.process import call
+from tests.study.isolation.test_code import apart, inside
 
 METHOD = """
 import os
@@ -68,14 +65,6 @@ class Mine:
 INSIDE = ("array.npy", "mapped.bin", "tensors.pt", "script.pt", "picture.png", "by_number.txt")
 
 
-def inside(folder: Path) -> Any:
-    return plugins.build("methods", "mine.py:Mine", {}, folder)
-
-
-def apart(folder: Path) -> Any:
-    return isolation.build("mine.py:Mine", {}, folder)
-
-
 def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -99,18 +88,10 @@ def test_what_a_call_reads_is_covered_or_named(tmp_path, monkeypatch, build):
     method = build(study)
     with isolation.opened(method, CPU) as ready:
         method.solve(2.0, None)
-    named = [outside / "weights.bin", outside / "tables" / "one.txt"]
-    assert ready.reads.covered == {
-        **{name: sha256(study / name) for name in INSIDE},
-        **{str(path): sha256(path) for path in named},
-        "nothing.txt": "absent",
-    }
-    assert set(ready.reads.uncovered) == {
-        str(outside / "at_import.txt"),
-        str(outside / "other.txt"),
-        str(study / "count.txt"),
-        STARTED,
-    }
+    named = {str(path): sha256(path) for path in (outside / "weights.bin", outside / "tables" / "one.txt")}
+    assert ready.reads.covered == {name: sha256(study / name) for name in INSIDE} | named | {"nothing.txt": "absent"}
+    others = outside / "at_import.txt", outside / "other.txt", study / "count.txt"
+    assert set(ready.reads.uncovered) == {STARTED, *map(str, others)}
 
 
 def test_a_method_of_this_package_declares_what_it_reads():

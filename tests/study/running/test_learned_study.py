@@ -1,13 +1,10 @@
-from __future__ import annotations
-
 import json
 
 import pytest
 
 from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import displays
-from holobench_eval.study.plan import plan
-from tests.study.studies import assert_refused
+from tests.study.studies import assert_refused, planned
 from tests.support.studies.trained_study import compute, needs, rounds, write
 
 LEARNED = ("profiles: [ideal]", 'learned: {method: "trained.py:Gain", profile: ideal, params: {rounds: 3}}')
@@ -39,14 +36,14 @@ def test_methods_are_shown_on_a_display_that_was_learned(tmp_path):
 
 def test_a_learned_display_is_one_more_thing_to_learn_and_another_training_gives_other_cells(tmp_path):
     config = write(tmp_path, LEARNED, ('["trained.py:Gain"]', f'[{FAST}, "trained.py:Gain"]'))
-    grid = plan(load_study(config))
+    grid = planned(config)
     (place,) = displays(load_study(config)).values()
     assert place.learned is not None
     assert [needed.params["rounds"] for needed in needs(config)] in ([2, 3], [3, 2])
     assert {needed.display.name for needed in needs(config)} == {"ideal"}
     assert all(place.learned.id in cell.prepared for cell in grid.cells)
     assert json.loads(json.dumps(grid.cells[-1].description())) == grid.cells[-1].description()
-    other = plan(load_study(write(tmp_path, (LEARNED[0], LEARNED[1].replace("rounds: 3", "rounds: 4")))))
+    other = planned(write(tmp_path, (LEARNED[0], LEARNED[1].replace("rounds: 3", "rounds: 4"))))
     shown = [
         {cell.id for cell in each.cells if cell.shown_on} for each in (grid, other)
     ]  # floor images need no display

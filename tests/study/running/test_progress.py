@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import io
 import math
 
@@ -74,10 +72,8 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path):
 def test_a_preview_counts_photographs_as_the_board_does(tmp_path):
     watching = "{name: online_camera, captures: 9, params: {captures: 12}}"
     study = load_study(write_config(tmp_path, ("wirtinger", watching, "hil", "hil_plus")))
-    learning = [
-        TrainingRow("hil-a", ("hil",), "done", 62, 1.0),
-        TrainingRow("hil_plus-a", ("hil_plus",), "unfinished", 5, 1.0),
-    ]
+    states = (("hil", "done", 62), ("hil_plus", "unfinished", 5))
+    learning = [TrainingRow(f"{name}-a", (name,), state, taken, 1.0) for name, state, taken in states]
     rows = preview(study, planning.plan(study), Store(tmp_path), threads=1, workers=1, learning=learning)
     targets = len(study.items)
     assert [row.photographs for row in rows[:4]] == [None, 0, 9 * targets, 62]
@@ -126,25 +122,22 @@ def bar(task: planning.Task, is_whole: bool) -> str:
 
 
 def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task):
-    now, left, lines = [0.0], [None, 90.0], list[str]()
+    now, lines = [0.0], list[str]()
     watch = Lines(lines.append, clock=lambda: now[0])
     watch.planned(2, 2, 0)
-    watch.expects(lambda: left[0])
-    for _ in range(2):
-        now[0] += 10
-        watch.started(task)
-        left.pop(0) if len(left) > 1 else None
-    assert ["left" in line for line in lines[1:]] == [False, True]
-    assert ", about 90 s left; now" in lines[-1]
-    for seconds, said in ((90.0, ", at least 90 s left; now"), (0.2, "")):  # a lower limit of nothing is not said
-        watch.expects(lambda: seconds, lambda: False)  # noqa: B023
+    for seconds, is_whole, said in (
+        *((None, True, ""), (90.0, True, ", about 90 s left; now"), (90.0, False, ", at least 90 s left; now")),
+        (0.2, False, ""),  # a lower limit of nothing is not said
+    ):
+        watch.expects(lambda: seconds, lambda: is_whole)  # noqa: B023
         now[0] += 10
         watch.started(task)
         assert said in lines[-1]
         assert ("left" in lines[-1]) == bool(said)
-    assert "about 90 s" in bar(task, True)
-    assert "at least" not in bar(task, True)
-    assert "at least 90 s" in bar(task, False)
+    whole, lowest = bar(task, True), bar(task, False)
+    assert "about 90 s" in whole
+    assert "at least" not in whole
+    assert "at least 90 s" in lowest
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The order in which trainings and cells are taken up."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any

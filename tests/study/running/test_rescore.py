@@ -1,10 +1,7 @@
 """A metric that comes later costs a column: captures are scored again, and nothing is solved or photographed."""
 
-from __future__ import annotations
-
 import shutil
 from collections import Counter
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,10 +14,11 @@ from holobench_eval.report.data.tables import difference
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.phases import phases_of
-from holobench_eval.study.plan import Cell, plan
+from holobench_eval.study.plan import Cell
 from holobench_eval.study.running import provenance
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
+from tests.study.studies import exchanged, planned
 from tests.support.studies import another_metric, trained_study
 from tests.support.studies.another_metric import COLUMN, NAME
 from tests.support.studies.trained_study import compute
@@ -34,17 +32,18 @@ display: {{profiles: [leto-mild], panel: [128, 128]}}
 targets: {{dataset: charts, params: {{names: [tv_lines, gray_ramp]}}}}
 methods: [double_phase]
 """
-FOCUS = (
-    PICTURE.replace("seed: 3", "seed: 3\nmeasure: focus\nheadline: psnr_linear_infocus")
-    .replace("charts, params: {names: [tv_lines, gray_ramp]}", "focal_stacks, params: {planes: [0, 1.5], blur: 0.03}")
-    .replace(
-        "[double_phase]", "[{name: multi_plane, params: {iterations: 2}}, {name: wirtinger, params: {iterations: 2}}]"
-    )
+TARGETS = "charts, params: {names: [tv_lines, gray_ramp]}"
+FOCUS = exchanged(
+    PICTURE,
+    ("seed: 3", "seed: 3\nmeasure: focus\nheadline: psnr_linear_infocus"),
+    (TARGETS, "focal_stacks, params: {planes: [0, 1.5], blur: 0.03}"),
+    ("[double_phase]", "[{name: multi_plane, params: {iterations: 2}}, {name: wirtinger, params: {iterations: 2}}]"),
 )
-PREDICTION = (
-    PICTURE.replace("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 2}}")
-    .replace("charts, params: {names: [tv_lines, gray_ramp]}", '"trained.py:Pictures", params: {count: 2}')
-    .replace("[double_phase]", '["trained.py:Even"]')
+PREDICTION = exchanged(
+    PICTURE,
+    ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 2}}"),
+    (TARGETS, '"trained.py:Pictures", params: {count: 2}'),
+    ("[double_phase]", '["trained.py:Even"]'),
 )
 MEASURES = {"picture": PICTURE, "focus": FOCUS, "prediction": PREDICTION}
 
@@ -53,18 +52,13 @@ MEASURES = {"picture": PICTURE, "focus": FOCUS, "prediction": PREDICTION}
 def done(monkeypatch):
     """How often a method was at work, and how many photographs were taken for a score."""
     count: Counter[str] = Counter()
-    start, photograph = cost.start, CalibratedBench.photograph
 
-    def started(*args: Any, **named: Any) -> Any:
-        count["solved"] += 1
-        return start(*args, **named)
+    def counted(where: Any, name: str, what: str) -> None:
+        function = getattr(where, name)
+        monkeypatch.setattr(where, name, lambda *args, **named: count.update([what]) or function(*args, **named))
 
-    def photographed(*args: Any, **named: Any) -> Any:
-        count["photographed"] += 1
-        return photograph(*args, **named)
-
-    monkeypatch.setattr(cost, "start", started)
-    monkeypatch.setattr(CalibratedBench, "photograph", photographed)
+    counted(cost, "start", "solved")
+    counted(CalibratedBench, "photograph", "photographed")
     return count
 
 
@@ -109,7 +103,7 @@ def fresh(base):
 
     def records(measure: str = "picture") -> list[dict[str, Any]]:
         folder = base(measure, BOTH)
-        return measured(Store(folder / "out").load(plan(load_study(folder / "study.yaml"))))
+        return measured(Store(folder / "out").load(planned(folder / "study.yaml")))
 
     return records
 
@@ -122,12 +116,12 @@ def measured(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def cells(config: Path) -> list[Cell]:
     """The cells that have a method."""
-    return [cell for cell in plan(load_study(config)).cells if cell.code]
+    return [cell for cell in planned(config).cells if cell.code]
 
 
 def forget(config: Path, captures: bool = True, phases: bool = True) -> None:
     """Delete what a run in the folder ``out`` has kept."""
-    kept, every = Store(config.parent / "out"), plan(load_study(config)).cells
+    kept, every = Store(config.parent / "out"), planned(config).cells
     for cell in every if captures else ():
         kept.capture(cell.id).unlink(missing_ok=True)
     for file in phases_of(config.parent / "out").folder.iterdir() if phases else ():
@@ -138,14 +132,10 @@ def column(outcome: Outcome, name: str = COLUMN) -> list[float | None]:
     return [record["scores"].get(name) for record in outcome.records]
 
 
-Study = Callable[..., Path]
-Fresh = Callable[..., list[dict[str, Any]]]
-
-
 @pytest.mark.parametrize("measure", MEASURES)
 def test_a_new_metric_has_the_digits_of_a_fresh_run(study, fresh, done, measure):
     config = study(measure)
-    grid, store = plan(load_study(config)), Store(config.parent / "out")
+    grid, store = planned(config), Store(config.parent / "out")
     before = store.load(grid)
     frame = records_frame(before, layout_of(load_study(config)))
     assert difference(frame, grid) == ""
@@ -165,7 +155,7 @@ def untold(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def test_a_run_fills_the_column_too_and_solves_nothing(study, done):
     config = study()
-    grid = plan(load_study(config))
+    grid = planned(config)
     first = [record["scores"]["psnr_linear"] for record in Store(config.parent / "out").load(grid)]
     outcome = compute(config)
     assert done == {}
@@ -177,7 +167,7 @@ def test_a_run_fills_the_column_too_and_solves_nothing(study, done):
 
 def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study):
     config = study(metrics=BOTH.replace("psnr,", "psnr, gmsd,"))
-    before = Store(config.parent / "out").load(plan(load_study(config)))
+    before = Store(config.parent / "out").load(planned(config))
     outcome = compute(config, rescore=(NAME,))  # from captures
     assert None not in column(outcome, "psnr_linear") + column(outcome)
     assert None in column(outcome, "gmsd_srgb")

@@ -1,17 +1,18 @@
-"""Control in studies of predictions: a model that predicts a capture may yet not answer a change of the hologram."""
-
-from __future__ import annotations
+"""Control in studies of predictions: what is changed of a hologram, and whether a model answers the change."""
 
 import shutil
 from pathlib import Path
 
 import pytest
+import torch
+from torch import Tensor
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.metrics.control import COLUMNS
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import plan
 from holobench_eval.study.scoring import prediction
+from holobench_eval.study.scoring.changed import PHASE_RMS, changed_target, moved_phase
+from tests.study.studies import planned
 from tests.support.studies import veiled
 from tests.support.studies.trained_study import compute, computed, write
 
@@ -63,9 +64,9 @@ def test_a_tone_curve_predicts_a_veil_and_does_not_control_it(scores):
 
 
 def test_floor_images_answer_nothing_and_have_no_control(scores):
-    floors = [found for (label, _), found in scores.items() if label.startswith("floor_")]
+    floors = [name for (label, _), found in scores.items() if label.startswith("floor_") for name in found]
     assert floors
-    assert not any(name.startswith("control") for found in floors for name in found)
+    assert not any(name.startswith("control") for name in floors)
 
 
 def test_control_is_added_to_what_was_predicted_before(tmp_path, monkeypatch, scores):
@@ -85,19 +86,15 @@ def test_control_is_added_to_what_was_predicted_before(tmp_path, monkeypatch, sc
 
 
 def test_a_study_that_names_no_metric_has_no_control(tmp_path):
-    assert "control" not in plan(load_study(study(tmp_path))).metrics
+    assert "control" not in planned(study(tmp_path)).metrics
 
 
-PICTURES = (PREDICTION[1], "seed: 3"), (METHODS[1], "[wirtinger]")
-MATCHED = (("panel: [128, 128]}", "panel: [128, 128], exposure: matched}"),)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"), [(PICTURES, "control is a score of models"), (MATCHED, "compares captures of equal light")]
-)
-def test_pictures_and_matched_light_have_no_control(tmp_path, changes, message):
-    with pytest.raises(UserError, match=message):
-        load_study(study(tmp_path, NAMED, *changes))
+def test_pictures_and_matched_light_have_no_control(tmp_path):
+    pictures = (PREDICTION[1], "seed: 3"), (METHODS[1], "[wirtinger]")
+    matched = (("panel: [128, 128]}", "panel: [128, 128], exposure: matched}"),)
+    for changes, message in ((pictures, "control is a score of models"), (matched, "compares captures of equal light")):
+        with pytest.raises(UserError, match=message):
+            load_study(study(tmp_path, NAMED, *changes))
 
 
 def test_holograms_that_do_not_follow_their_target_have_no_control(tmp_path):
@@ -105,3 +102,41 @@ def test_holograms_that_do_not_follow_their_target_have_no_control(tmp_path):
     records = compute(study(tmp_path, NAMED, probe, PROFILES[::-1])).records
     reasons = {record["reason"] for record in records if not record["label"].startswith("floor_")}
     assert reasons == {"veiled.py:Ideal has the same hologram for another target, so none has control"}
+
+
+def picture(bright: int, height: int = 60, width: int = 90) -> Tensor:
+    """Gray, and brighter in the left half (0) or in the right one (1)."""
+    target = torch.full((3, height, width), 0.2)
+    target[..., bright * width // 2 : (bright + 1) * width // 2] = 0.4
+    return target
+
+
+@pytest.mark.parametrize("bright", [0, 1])
+def test_the_brighter_half_loses_its_light_and_the_other_none(bright):
+    target = picture(bright)
+    halves = changed_target(target, "half", 3, "t").split(45, dim=-1)
+    assert not halves[bright].any()
+    assert torch.equal(halves[1 - bright], torch.full((3, 60, 45), 0.2))
+    assert torch.equal(target, picture(bright))
+
+
+@pytest.mark.parametrize(("level", "expected"), [(0.2, 1.0), (0.9, 0.0)])
+def test_a_patch_of_a_fifth_of_the_side_becomes_white_or_black_if_it_was_bright(level, expected):
+    target = torch.full((3, 60, 90), level)
+    changed = changed_target(target, "patch", 3, "t") != target
+    assert changed.sum() == 3 * 12**2
+    assert (changed_target(target, "patch", 3, "t")[changed] == expected).all()
+    assert not torch.equal(changed, changed_target(target, "patch", 3, "another") != target)
+
+
+def test_the_phase_moves_smoothly_in_the_middle_of_the_panel_alone_and_by_names():
+    phase = torch.rand((3, 128, 192), dtype=torch.float64)
+    before = phase.clone()
+    move = moved_phase(phase, 3, "t") - phase
+    middle = move[:, 32:96, 48:144]
+    assert float(middle.square().mean().sqrt()) == pytest.approx(PHASE_RMS)
+    assert float(move.square().sum()) == pytest.approx(float(middle.square().sum()))
+    assert float(middle.diff(dim=-1).abs().max()) < 0.4
+    assert torch.equal(move[0].round(decimals=9), move[2].round(decimals=9))
+    assert torch.allclose(moved_phase(phase, 3, "t") - before, move)
+    assert not torch.allclose(moved_phase(phase, 3, "another") - before, move)

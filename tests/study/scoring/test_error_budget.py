@@ -1,7 +1,5 @@
 """Error budgets of displays of which is known what spoils their pictures."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A method may give NumPy's arrays: each scores to the last digit what the tensor of the same numbers scores."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -11,43 +9,10 @@ import torch
 
 from holobench_eval.display.api import from_numpy
 from tests.study.studies import write_study
+from tests.support import plugins
 from tests.support.studies.trained_study import compute
 
-METHODS = """
-from dataclasses import dataclass
-
-import numpy as np
-import torch
-
-
-@dataclass(frozen=True)
-class Tensors:
-    double: bool = False
-
-    def solve(self, target, bench):
-        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
-        return phase.double() / 3 if self.double else phase
-
-    def predict(self, phase, bench):
-        return torch.rand((*phase.shape[:2], *bench.spec.region.shape), generator=bench.generator("light"))
-
-
-@dataclass(frozen=True)
-class Arrays(Tensors):
-    def solve(self, target, bench):
-        return np.asfortranarray(super().solve(target, bench).numpy())
-
-    def predict(self, phase, bench):
-        return super().predict(phase, bench).numpy()[..., ::-1][..., ::-1]
-
-
-def array(target, bench):
-    return Arrays().solve(target, bench)
-
-
-def levels(target, bench):
-    return np.zeros((*target.shape[:2], *bench.spec.shape), np.uint8)
-"""
+METHODS = plugins.text("arrays")
 
 EXPECTED = "expected tensors, numbers, text, lists or mappings of them"
 REFUSED = {
@@ -70,9 +35,8 @@ def named(label: str, name: str, params: str = "{}") -> str:
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
 def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path, isolation):
-    double = "{double: true}"
     methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array"), named("levels", "levels")]
-    methods += [named("t64", "Tensors", double), named("a64", "Arrays", double)]
+    methods += [named(f"{name[0].lower()}64", name, "{double: true}") for name in ("Tensors", "Arrays")]
     found = records(tmp_path, isolation, *methods)
     levels = found.pop("levels")
     assert (levels["state"], levels["reason"]) == ("failed", REFUSED[isolation].format("levels"))

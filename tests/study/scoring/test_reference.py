@@ -1,7 +1,5 @@
 """A method of somebody else's code that changes the harness stops the run, and is named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -12,41 +10,9 @@ from holobench_eval.core.errors import StopError
 from holobench_eval.metrics import protocol
 from holobench_eval.study.store import Store
 from tests.study.studies import MILD, compute, write_study
+from tests.support.plugins import text
 
-METHODS = """
-from dataclasses import dataclass
-
-import torch
-from holobench_eval.metrics import protocol
-
-
-@dataclass(frozen=True)
-class Honest:
-    def solve(self, target, bench):
-        return torch.zeros((*target.shape[:2], *bench.spec.shape))
-
-
-@dataclass(frozen=True)
-class Flatterer(Honest):
-    def solve(self, target, bench):
-        refine = protocol.match
-        protocol.match = lambda image, target, *more, **named: (target, refine(image, target, *more, **named)[1])
-        return super().solve(target, bench)
-
-
-@dataclass(frozen=True)
-class Silencer(Honest):
-    def solve(self, target, bench):
-        torch.randn = lambda *shape, **options: torch.zeros(*shape)
-        return super().solve(target, bench)
-
-
-@dataclass(frozen=True)
-class Failing(Honest):
-    def solve(self, target, bench):
-        torch.randn = lambda *shape, **options: torch.zeros(*shape)
-        raise ValueError("and then it fails")
-"""
+METHODS = text("harmful")
 
 
 def study(folder: Path, *methods: str) -> Path:

@@ -1,13 +1,12 @@
 """A method that follows the others of its study: its plan, its starts, and what is computed again."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import torch
@@ -18,27 +17,22 @@ from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local
 from holobench_eval.study.phases import phases_of, start_of
-from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.plan import Cell, Plan
 from holobench_eval.study.running import run as running
 from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
-from tests.study.studies import add_other_profile
+from tests.study.studies import add_other_profile, planned
 from tests.support.patience import killed_at
 from tests.support.studies.fake_study import fake_work, held, installed, solves, untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
-POOR, GOOD = (
-    '{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5))
-)
+POOR = '{name: "plugins.py:Toy", label: poor, params: {value: 1}}'
+GOOD = POOR.replace("poor", "good").replace("1", "5")
 FOLLOWING = '{name: "plugins.py:Following", label: oracle}'
 FAILING = '{name: "plugins.py:Toy", label: good, params: {value: 5, fail: "no light"}}'
 TARGETS = ("gray 0", "gray 1")
-
-
-def planned(config: Path) -> Plan:
-    return plan(load_study(config))
 
 
 def cells(grid: Plan, label: str) -> list[Cell]:
@@ -89,9 +83,8 @@ def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repea
     by_id = {cell.id: cell for cell in grid.cells}
     for cell in cells(grid, "oracle"):
         others = [by_id[identity] for identity in cell.starts]
-        assert {(one.target, one.condition, one.repeat) for one in others} == {
-            (cell.target, cell.condition, cell.repeat)
-        }
+        for one in others:
+            assert (one.target, one.condition, one.repeat) == (cell.target, cell.condition, cell.repeat)
         assert sorted(one.params["value"] for one in others) == [1, 5]
         assert set(cell.phase["starts"]) == {one.phase_id for one in others}
 
@@ -134,9 +127,7 @@ def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_ag
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_and_gives_the_same_record(
-    done, store, grid, lost
-):
+def test_a_start_is_solved_again_only_where_its_phase_was_lost_and_gives_the_same_record(done, store, grid, lost):
     solved = len(solves(done.parent))
     alone = untimed([one for one in store.load(grid) if one["label"] != "oracle"])
     followers = cells(grid, "oracle")
@@ -147,9 +138,7 @@ def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_an
     assert untimed([one for one in together if one["label"] != "oracle"]) == alone
 
 
-def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(
-    done, store, grid, monkeypatch
-):
+def test_a_cell_whose_start_has_to_be_computed_loses_its_record_first(done, store, grid, monkeypatch):
     first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
     store.path(first.id).unlink()
     states = store.states(grid.cells)
@@ -175,12 +164,9 @@ def test_starts_that_are_only_timed_again_leave_their_followers_alone(done, stor
 
 @pytest.mark.parametrize("refusal", ["refuse_unscored", "refuse_unavailable"])
 def test_a_run_that_is_refused_removes_no_record(done, store, grid, refusal, monkeypatch):
-    def refused(*_: Any) -> None:
-        raise UserError("not here")
-
     store.remove((cells(grid, "poor")[0].id,))
     before = store.states(grid.cells)
-    monkeypatch.setattr(running, refusal, refused)
+    monkeypatch.setattr(running, refusal, Mock(side_effect=UserError("not here")))
     with pytest.raises(UserError, match="not here"):
         compute(done)
     assert store.states(grid.cells) == before

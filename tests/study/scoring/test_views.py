@@ -1,7 +1,5 @@
 """Light fields: what is planned, which method sees what, and what it is worth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -37,11 +35,10 @@ def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path
     tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     for label in ("wirtinger", "light_field"):
         for task in tasks[label]:
-            assert {cell.target.split(" ")[0] for cell in task.cells} == {task.cells[0].target.split(" ")[0]}
+            assert len({cell.target.split(" ")[0] for cell in task.cells}) == 1
             assert {cell.change["eye_pupil"] for cell in task.cells} == {"-0.4", "0.1", "0.4"}
-        cells = [cell for task in tasks[label] for cell in task.cells]
-        assert len(cells) == 2 * 3 * 2
-        assert {cell.condition for cell in cells} == {"ideal-frames", "plm-4bit"}
+        displays = [cell.condition for task in tasks[label] for cell in task.cells]
+        assert sorted(displays) == ["ideal-frames"] * 6 + ["plm-4bit"] * 6
 
 
 def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path):
@@ -66,13 +63,10 @@ def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(t
     [
         (
             (CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"),
-            "4:20: dataset 'charts' has no",
+            "4:20: dataset 'charts' has",
         ),
         (("[-0.4, 0.1, 0.4]", "[1.4]"), "4:51: dataset 'light_fields': parameter 'places.0'"),
-        (
-            ("light_field, params: {frames: 4", "light_field, params: {frames: 9"),
-            "7:12: frames: 9; 'ideal-frames' shows",
-        ),
+        (("frames: 4", "frames: 9"), "7:12: frames: 9; 'ideal-frames' shows"),
         (("profiles: [ideal-frames.yaml]", "profiles: [pluto-fourier]"), "2:10: measure: views needs a Fresnel plane"),
     ],
 )
