@@ -17,9 +17,7 @@ def committed(made):
     return made.parents[1] / "study.yaml", made
 
 
-def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_alone(
-    committed,
-):
+def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_alone(committed):
     config, folder = committed
 
     def tables() -> list[bytes]:

@@ -14,14 +14,7 @@ from holobench_eval.display.simulated import profile as profiles
 from holobench_eval.report.family import write_family
 from holobench_eval.study.calibration import family as families
 from holobench_eval.study.calibration import posterior
-from holobench_eval.study.calibration.family import (
-    compute,
-    drawn,
-    load_family,
-    missed,
-    profile_of,
-    rows_of,
-)
+from holobench_eval.study.calibration.family import compute, drawn, load_family, missed, profile_of, rows_of
 from holobench_eval.study.definition import Targets
 from holobench_eval.study.executors import Serial
 

@@ -63,8 +63,7 @@ FORMS = {
         "    solve = functools.partialmethod(_solve, odd=1)\n"
     ),
     "callable object": of_class(
-        "    solve = Scaled()\n",
-        "class Scaled:\n    def __call__(self, target, bench):\n        return 1.0 * target\n",
+        "    solve = Scaled()\n", "class Scaled:\n    def __call__(self, target, bench):\n        return 1.0 * target\n"
     ),
     "subclass that sets a class variable": of_class(
         "    scale: ClassVar[float] = 0\n    def solve(self, target, bench):\n        return self.scale * target\n"

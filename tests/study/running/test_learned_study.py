@@ -19,7 +19,7 @@ def test_methods_are_shown_on_a_display_that_was_learned(tmp_path):
     found = {record["label"]: record for record in outcome.records}
     reasons = {label: (record["state"], record["reason"]) for label, record in found.items()}
     assert reasons == dict.fromkeys(reasons, ("done", "")) | {
-        "Peeking": ("failed", "a learned display has no simulated bench to look into"),
+        "Peeking": ("failed", "a learned display has no simulated bench to look into")
     }
     assert {record["cell"]["condition"] for record in outcome.records} == {"reference", "Gain trained on ideal"}
     assert found["wirtinger"]["registration_residual_px"] == 0

@@ -61,10 +61,7 @@ def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(t
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            (CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"),
-            "4:20: dataset 'charts' has",
-        ),
+        ((CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"), "4:20: dataset 'charts' has"),
         (("[-0.4, 0.1, 0.4]", "[1.4]"), "4:51: dataset 'light_fields': parameter 'places.0'"),
         (("frames: 4", "frames: 9"), "7:12: frames: 9; 'ideal-frames' shows"),
         (("profiles: [ideal-frames.yaml]", "profiles: [pluto-fourier]"), "2:10: measure: views needs a Fresnel plane"),
