@@ -87,17 +87,15 @@ def test_a_report_of_other_methods_pictures_or_displays_stays(picture):
     cv2.imwrite(str(picture), np.full((120, 120), 90, np.uint8))
     for display in ("ideal", "leto-mild"):
         solve("double_phase", picture, display=display, panel=(128, 128))
-    folders = [Path("holoeval-results", name) for name in ("my picture", "my picture-2", "my picture-3")]
-    files = [folder / name for folder in folders for name in ("report.md", "study.yaml")]
+    names = ["my picture", "my picture-2", "my picture-3"]
+    files = [Path("holoeval-results", name, file) for name in names for file in ("report.md", "study.yaml")]
     texts = [file.read_text() for file in files]
     assert len(set(texts)) == 6
     solve("double_phase", picture, display="ideal", panel=(128, 128))  # the second once more
-    assert sorted(path.name for path in Path("holoeval-results").iterdir() if path.name != "solved") == [
-        folder.name for folder in folders
-    ]
+    assert sorted(path.name for path in Path("holoeval-results").iterdir()) == [*names, "solved"]
     for method in ("gerchberg_saxton", "wirtinker"):
         with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
-            solve(method, picture, display="ideal", panel=(128, 128), output=folders[1])
+            solve(method, picture, display="ideal", panel=(128, 128), output=Path("holoeval-results", names[1]))
     assert [file.read_text() for file in files] == texts
 
 

@@ -40,6 +40,15 @@ def write_green(folder: Path, like: str) -> Path:
     return path
 
 
+def write_ideal_green(folder: Path, name: str, effect: str = "") -> None:
+    """The file of a display of one laser that is ideal but for an effect, as YAML says it."""
+    panel = (
+        "shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.17e-7], distance: 0.02, bits: 8, pupil: 0.8, region: 0.8125"
+    )
+    head = f"name: {name}\nversion: 1\nseed: 0\ndescription: Ideal but for an effect.\n"
+    (folder / f"{name}.yaml").write_text(f"{head}panel: {{{panel}}}\n{effect}\n")
+
+
 def exchanged(text: str, *changes: tuple[str, str]) -> str:
     """A text with pieces exchanged, each of which it has."""
     for old, new in changes:

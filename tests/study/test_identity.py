@@ -81,11 +81,6 @@ def test_what_a_method_is_given_names_its_phase_and_what_is_photographed_its_cap
             assert {cell.phase_id for cell in before.cells} <= {cell.phase_id for cell in after.cells}
 
 
-def test_every_repeat_has_a_phase_of_its_own(tmp_path):
-    repeats = [cell for cell in grid(tmp_path, BLIND, ("seed: 3", "seed: 3\nrepeats: 3")).cells if cell.code]
-    assert len({cell.phase_id for cell in repeats}) == len(repeats) == 2 * 3
-
-
 def test_another_version_or_method_makes_another_phase(tmp_path, monkeypatch):
     kinds = ("double_phase", "double_phase_aa", "double_phase_bl")
     assert len({first(grid(tmp_path, kind)).phase_id for kind in kinds}) == 3

@@ -16,7 +16,7 @@ from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
 from tests.study.studies import TURNS, add_one_laser, add_other_profile, compute, exchanged, planned, write_ideal
 from tests.support.studies import trained_study
-from tests.support.studies.fake_study import solves, untimed, write_config
+from tests.support.studies.fake_study import untimed, write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 SOLUTION = Solution(torch.linspace(-4, 4, 24).view(2, 3, 4), 5, Cost(0.25, 3.5), "has used its 5", "abc", False)
@@ -76,15 +76,6 @@ def test_only_studies_of_a_folder_of_results_share_their_phases():
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
-
-
-def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path):
-    for name in ("one", "two"):
-        write_ideal(tmp_path / f"{name}.yaml", ("name: ideal", f"name: {name}"))
-    config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
-    assert compute(config, tmp_path / RESULTS / "a").solved == 2
-    assert compute(config, tmp_path / RESULTS / "b").solved == 0
-    assert len(solves(tmp_path)) == 2
 
 
 def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path, found):

@@ -29,19 +29,14 @@ methods: [double_phase]
 protocol: {metrics: [psnr]}
 """
 OWN = STUDY.replace("photographs, params: {count: 1}", "folder, params: {path: images}").replace(
-    "double_phase", "own.py:Elsewhere"
+    "double_phase", "own.py:elsewhere"
 )
 METHOD = """\
-from dataclasses import dataclass
-
 import torch
 
-
-@dataclass(frozen=True)
-class Elsewhere:
-    def solve(self, target, bench):
-        torch.seed()  # as on another machine: no two solutions are the same
-        return 6.2831 * torch.rand(*target.shape[:2], *bench.spec.shape)
+def elsewhere(target, bench):
+    torch.seed()  # as on another machine: no two solutions are the same
+    return 6.2831 * torch.rand(*target.shape[:2], *bench.spec.shape)
 """
 
 
@@ -78,7 +73,7 @@ def test_a_session_with_its_bench_file_imports_anywhere(tmp_path, monkeypatch):
 def test_a_session_of_own_code_needs_its_study_and_has_the_holograms_of_the_export(tmp_path, monkeypatch):
     session = moved(tmp_path, monkeypatch, OWN)
     _, failure = run("session", "import", session)
-    for missing in ("path: images", "own.py:Elsewhere", "dataset: folder", "give --study"):
+    for missing in ("path: images", "own.py:elsewhere", "dataset: folder", "give --study"):
         assert missing in failure
     assert "benches" not in failure
 

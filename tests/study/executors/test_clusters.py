@@ -22,6 +22,7 @@ from holobench_eval.study.running import run as running
 from tests.study.executors.test_executors import compute, untimed
 from tests.support.studies.fake_study import fake_work, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
 SBATCH = """\
 #!{python}
 import pathlib, subprocess, sys
@@ -42,8 +43,6 @@ for job in sys.argv[1:]:
 """
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
 def test_workers_of_a_scheduler_elsewhere_give_the_table_of_one_process_where_the_run_reads(tmp_path, monkeypatch):
     from distributed import LocalCluster
 
@@ -67,7 +66,6 @@ def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
         clusters._at_home(str(tmp_path / "gone"), resources, 0)
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_records_that_cannot_be_seen_end_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "LATE", 0.0)
 
@@ -173,7 +171,6 @@ def queue(tmp_path, monkeypatch):
         yield tmp_path / "jobs"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("on_gpu", [False, True])
 def test_slurm_jobs_have_one_thread_declare_a_gpu_and_keep_the_sites_own_arguments(queue, on_gpu, monkeypatch):
     import dask

@@ -20,6 +20,8 @@ from tests.study import studies
 from tests.support.patience import PATIENCE, wait_until
 from tests.support.studies.fake_study import lose_a_worker, noted_work, solves, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
+
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
     return studies.compute(config, output, executor=chosen, **options).records
@@ -29,8 +31,6 @@ def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "alone": None} for record in records]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
 def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(tmp_path, monkeypatch):
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
@@ -42,8 +42,6 @@ def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(tmp_pa
     assert untimed(local) == untimed(serial[:lost] + serial[lost + 1 :])
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
 def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(tmp_path, monkeypatch):
     methods = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}, pause: 0.2}}}}' for i in range(3))
     config = write_config(tmp_path, methods)
@@ -60,7 +58,6 @@ def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(tmp_path, mon
     assert True in overlapping
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path):
     class Both(Serial):
         def map(self, function: Any, jobs: Any) -> Any:
@@ -89,7 +86,6 @@ def endless(folder: Path) -> None:
     time.sleep(1000)
 
 
-@pytest.mark.slow
 def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_return_errors(tmp_path, monkeypatch):
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
@@ -104,7 +100,6 @@ def run_of_two(folder: Path) -> None:
     list(Local(2).map(endless, [folder] * 2))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
 def test_workers_end_with_their_run(tmp_path, ending):
     def end(run: int) -> None:
@@ -126,7 +121,6 @@ def test_workers_end_with_their_run(tmp_path, ending):
     wait_until(lambda: not any(Path("/proc", worker.name).exists() for worker in tmp_path.iterdir()))
 
 
-@pytest.mark.slow
 def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path):
     (tmp_path / "slow.py").write_text("import time\nopen('importing', 'w').close()\ntime.sleep(1)")
     code = """if True:
@@ -147,7 +141,6 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path):
     assert run.communicate(timeout=PATIENCE) == ("seen\n", "")
 
 
-@pytest.mark.slow
 def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others():
     processes.prepare()
     server: Any = forkserver._forkserver  # type: ignore[attr-defined]

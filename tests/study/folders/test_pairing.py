@@ -272,9 +272,6 @@ def test_a_turned_border_leaves_a_rectangle_that_is_shown_everywhere():
     part = largest_part(mask)
     assert mask[part[0] : part[1], part[2] : part[3]].all()
     assert share(part, mask.shape) > 0.6
-
-
-def test_nothing_shown_has_no_part():
     assert share(largest_part(np.zeros((40, 60), dtype=bool)), (40, 60)) == 0
 
 

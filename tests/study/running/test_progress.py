@@ -15,6 +15,8 @@ from holobench_eval.study.store import Record, Store
 from tests.study.studies import compute
 from tests.support.studies.fake_study import write_config
 
+pytestmark = pytest.mark.usefixtures("no_physics")
+
 
 def failed(task: planning.Task) -> list[Record]:
     return [
@@ -54,7 +56,6 @@ def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task, ter
     assert ("1 failed" in text.getvalue()) == terminal
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path):
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}', "plugins.py:Seeing"))
     study = load_study(config)
@@ -147,7 +148,6 @@ def test_a_time_is_said_in_the_unit_that_people_would_use(seconds, words):
     assert duration(seconds) == words
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path):
     study = load_study(write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing")))
     left, started = list[float | None](), list[str]()

@@ -193,7 +193,6 @@ def test_a_metric_without_its_weights_is_refused_by_a_run_alone(tmp_path, monkey
     assert not solves(tmp_path)
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_a_run_says_what_it_ran_on(tmp_path):
     config = write_config(tmp_path, count=1)
     known = compute(config, tmp_path / "out").provenance
@@ -206,7 +205,6 @@ def test_a_run_says_what_it_ran_on(tmp_path):
     assert known == known | wanted | {"threads": 1, "workers": 1}
 
 
-@pytest.mark.usefixtures("no_physics")
 def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_computed(tmp_path):
     config, store = write_config(tmp_path, count=1), Store(tmp_path / "out")
     first = compute(config, store.output).provenance

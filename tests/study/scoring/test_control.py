@@ -12,7 +12,7 @@ from holobench_eval.metrics.control import COLUMNS
 from holobench_eval.study.config import load_study
 from holobench_eval.study.scoring import prediction
 from holobench_eval.study.scoring.changed import PHASE_RMS, changed_target, moved_phase
-from tests.study.studies import planned
+from tests.study.studies import planned, write_ideal_green
 from tests.support.studies import veiled
 from tests.support.studies.trained_study import compute, computed, write
 
@@ -20,23 +20,13 @@ PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {ite
 NAMED = ("methods:", "protocol: {metrics: [psnr, control]}\nmethods:")
 UNNAMED = ("methods:", "protocol: {metrics: [psnr]}\nmethods:")
 METHODS = ('["trained.py:Gain"]', '["trained.py:Even", "veiled.py:Ideal", "veiled.py:Veil", "veiled.py:Tone"]')
-PROFILES = ("{profiles: [ideal], panel: [128, 128]}", "{profiles: [ideal, veil.yaml], panel: [128, 128]}")
-PROFILE = """\
-name: veil
-version: 1
-seed: 0
-description: An ideal display but for a veil.
-panel:
-  {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-7], distance: 0.02, bits: 8, pupil: 0.8,
-   region: 0.8125}
-stray_light: {share: 0.6, reach: 0.2}
-sensor: {pitch: 3.72e-6, noise: false}
-"""
+PROFILES = ("{profiles: [ideal], panel: [128, 128]}", "{profiles: [plain.yaml, veil.yaml]}")
 
 
 def study(folder: Path, *changes: tuple[str, str]) -> Path:
     shutil.copy(veiled.__file__, folder / "veiled.py")
-    (folder / "veil.yaml").write_text(PROFILE)
+    write_ideal_green(folder, "plain", "sensor: {pitch: 3.72e-6, noise: false}")
+    write_ideal_green(folder, "veil", "sensor: {pitch: 3.72e-6, noise: false}\nstray_light: {share: 0.6, reach: 0.2}")
     return write(folder, PREDICTION, METHODS, PROFILES, *changes)
 
 
@@ -48,7 +38,7 @@ def scores(tmp_path_factory):
     return {(record["label"], record["cell"]["condition"]): record["scores"] for record in records}
 
 
-@pytest.mark.parametrize(("label", "display"), [("Ideal", "ideal"), ("Veil", "veil")])
+@pytest.mark.parametrize(("label", "display"), [("Ideal", "plain"), ("Veil", "veil")])
 def test_a_model_of_the_display_without_noise_has_nearly_full_control(scores, label, display):
     assert all(scores[label, display][name] > 0.95 for name in COLUMNS)
 
@@ -91,7 +81,7 @@ def test_a_study_that_names_no_metric_has_no_control(tmp_path):
 
 def test_pictures_and_matched_light_have_no_control(tmp_path):
     pictures = (PREDICTION[1], "seed: 3"), (METHODS[1], "[wirtinger]")
-    matched = (("panel: [128, 128]}", "panel: [128, 128], exposure: matched}"),)
+    matched = (("veil.yaml]}", "veil.yaml], exposure: matched}"),)
     for changes, message in ((pictures, "control is a score of models"), (matched, "compares captures of equal light")):
         with pytest.raises(UserError, match=message):
             load_study(study(tmp_path, NAMED, *changes))

@@ -13,16 +13,9 @@ from holobench_eval.report.data.error_budget import Budget, budgets
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.study.config import load_study
+from tests.study.studies import write_ideal_green
 from tests.support.studies.trained_study import computed, write
 
-PROFILE = """\
-name: {name}
-version: 1
-seed: 0
-description: An ideal display but for what is known.
-panel: {{shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.17e-7], distance: 0.02, bits: 8, pupil: 0.8, region: 0.8125}}
-{effect}
-"""
 SHADED = "stray_light: {share: 0.3, reach: 0.2}\nsensor: {pitch: 3.72e-6, vignetting: 0.3, noise: true, read_noise: 60}"
 UNMODULATED = "zero_order: {fraction: 0.1, phase: 0.5}\nsensor: {pitch: 3.72e-6, noise: true, read_noise: 60}"
 METHODS = """[
@@ -30,11 +23,8 @@ METHODS = """[
   {name: image_network, profiles: [unmodulated.yaml], params: {start: {iterations: 20}, training: {steps: 20}}},
   {name: field_network, profiles: [unmodulated.yaml], params: {start: {iterations: 20}, training: {steps: 120}}}]"""
 STUDY = (
-    (
-        "seed: 3",
-        "seed: 3\nmeasure: error_budget\nholograms: {params: {iterations: 20}}\n"
-        "protocol: {metrics: [psnr, ssim, control]}",
-    ),
+    ("seed: 3", "seed: 3\nmeasure: error_budget\nprotocol: {metrics: [psnr, ssim, control]}"),
+    ("methods:", "holograms: {params: {iterations: 20}}\nmethods:"),
     ("{profiles: [ideal], panel: [128, 128]}", "{profiles: [shaded.yaml, unmodulated.yaml]}"),
     ("count: 1}", "count: 2}"),
     ('"trained.py:Unseen", held_out: 1}', '"trained.py:Unseen", params: {count: 7}, held_out: 2}'),
@@ -48,7 +38,7 @@ def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("budget")
     config = write(folder, *STUDY)
     for name, effect in (("shaded", SHADED), ("unmodulated", UNMODULATED)):
-        (folder / f"{name}.yaml").write_text(PROFILE.format(name=name, effect=effect))
+        write_ideal_green(folder, name, effect)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(patterns, "Wirtinger", partial(Wirtinger, iterations=20))  # as all other holograms here
         records = computed(config)

@@ -26,7 +26,7 @@ from tests.study.studies import add_other_profile, planned
 from tests.support.patience import killed_at
 from tests.support.studies.fake_study import fake_work, held, installed, solves, untimed, write_config
 
-pytestmark = pytest.mark.usefixtures("no_physics")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
 
 POOR = '{name: "plugins.py:Toy", label: poor, params: {value: 1}}'
 GOOD = POOR.replace("poor", "good").replace("1", "5")
@@ -97,7 +97,6 @@ def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_know
     assert {cell.id for cell in without.cells} < {cell.id for cell in both.cells}
 
 
-@pytest.mark.slow
 def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_process_does(done, store, grid, monkeypatch):
     serial = store.load(grid)
     for target in TARGETS:
@@ -216,7 +215,6 @@ def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian():
     assert float((torch.exp(1j * start) - torch.exp(1j * phase)).abs().max()) < 1e-4
 
 
-@pytest.mark.slow
 def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(computed, grid, tmp_path):
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), count=len(TARGETS))
     for index, begun in ((1, 3), (0, 6)):  # while a start is solved, and while the first follower is

@@ -71,32 +71,25 @@ def test_what_has_no_views_is_refused_at_its_place(tmp_path, change, message):
     assert_refused(write(tmp_path, change), message)
 
 
-DATASET = """
+CODE = """
 from holobench_eval.datasets.light_fields import LightFields
 
 class Wide(LightFields):
     def place(self, view):
         return 3 * super().place(view)
-"""
-METHOD = """
-from dataclasses import dataclass
-from typing import ClassVar
 
-@dataclass(frozen=True)
-class Blind:
-    views: ClassVar[bool] = True
+def blind(target, bench):
+    return target
 
-    def solve(self, target, bench):
-        return target
+blind.views = True
 """
 
 
 def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path):
-    (tmp_path / "wide.py").write_text(DATASET)
-    path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'wide.py:Wide', params"))
+    (tmp_path / "mine.py").write_text(CODE)
+    path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'mine.py:Wide', params"))
     with pytest.raises(UserError, match=r"from -1\.2.*; expected places from '-1' to '1' radii of the iris"):
         load_study(path)
-    (tmp_path / "blind.py").write_text(METHOD)
-    path = write(tmp_path, ("{name: wirtinger, params: {iterations: 30}}", "'blind.py:Blind'"))
-    with pytest.raises(UserError, match=r"Blind': views is True, which needs a function solve_views"):
+    path = write(tmp_path, ("{name: wirtinger, params: {iterations: 30}}", "'mine.py:blind'"))
+    with pytest.raises(UserError, match=r"blind': views is True, which needs a function solve_views"):
         load_study(path)
