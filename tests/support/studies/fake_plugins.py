@@ -28,11 +28,6 @@ class Gray:
 
 
 @dataclass(frozen=True)
-class Training(Gray):
-    training: ClassVar[bool] = True
-
-
-@dataclass(frozen=True)
 class Toy:
     """A fake method: a constant phase, and a line in a file for every solution; it waits while a test holds it."""
 
