@@ -244,10 +244,7 @@ def test_what_is_suspicious_is_noted(tmp_path):
 
 def test_wrong_choices_are_named(scored):
     root = scored[0]
-    for options, line in (
-        ({"values": "gamma"}, "allowed: linear, srgb"),
-        ({"baseline": "cleen"}, "did you mean 'clean'"),
-    ):
+    for options, line in (({"values": "gamma"}, "allowed: linear, srgb"), ({"baseline": "cleen"}, "you mean 'clean'")):
         with pytest.raises(UserError, match=line):
             run(root, **options)
     with pytest.raises(UserError, match="would mix with"):

@@ -9,64 +9,15 @@ import pytest
 
 from holobench_eval.core.device import CPU
 from holobench_eval.study import cost, isolation
+from tests.support import plugins
+from tests.support.plugins.burning import BURNER, MIB
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
 
-MIB = 96
-BURNER = "import time; x = bytearray(b'1') * {mib} * 2**20; print(1, flush=True)\nwhile {more}: pass"
-BURNED = BURNER.format(mib=MIB, more="time.process_time() < 0.3")
-LASTING = f"{BURNED}\nprint(2, flush=True)\nwhile True: pass"
-METHODS = f'''
-import os, subprocess, sys, time
-from dataclasses import dataclass
-
-SECONDS = 0.3
-
-
-def burn():
-    began = time.process_time()
-    while time.process_time() - began < SECONDS:
-        pass
-
-
-@dataclass(frozen=True)
-class Plain:
-    def solve(self, target, bench):
-        return target
-
-
-class SetsPeakBack(Plain):
-    def solve(self, target, bench):
-        held = bytearray(b"1") * {MIB} * 2**20
-        time.sleep(4 * {cost.EACH})
-        del held
-        with open("/proc/self/clear_refs", "w") as file:
-            file.write("5")
-        return target
-
-
-class HasItDone(Plain):
-    """By a process that ends before it does."""
-
-    def solve(self, target, bench):
-        subprocess.run([sys.executable, "-c", {BURNED!r}])
-        return target
-
-
-class LeavesIt(Plain):
-    """To a process of another session, which goes on and on."""
-
-    def solve(self, target, bench):
-        mine = [sys.executable, "-c", {LASTING!r}, os.getcwd()]
-        told = subprocess.Popen(mine, start_new_session=True, stdout=subprocess.PIPE).stdout
-        told.readline(), told.readline()
-        return target
-'''
-
 
 def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
-    """What a class of ``METHODS`` takes in its process; more: code that its file ends with."""
-    (folder / "mine.py").write_text(METHODS + more)
+    """What a class of ``burning`` takes in its process; more: code that its file ends with."""
+    (folder / "mine.py").write_text(plugins.text("burning") + more)
     method = isolation.build(f"mine.py:{name}", {}, folder)
     with isolation.opened(method, CPU) as ready:
         watch = cost.start(CPU, ready.pid)
