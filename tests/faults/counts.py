@@ -9,7 +9,7 @@ from holobench_eval.study.artifacts import progress, provenance_of
 
 COUNTS = Path("counts")  # files with a line for each capture, written as the camera is asked
 TRAINING = "training"
-CAMERA = "Mine"  # the method that has one
+CAMERA = "mine"  # the method that has one
 
 
 def note(names: Sequence[object]) -> str:

@@ -18,7 +18,7 @@ protocol: {metrics: [psnr]}
 methods:
   - double_phase
   - {name: wirtinger, params: {iterations: 5}}
-  - {name: "mine.py:Mine", captures: 3}
+  - {name: "mine.py:mine", captures: 3}
 """
 QUICK = exchanged(
     BENCH,

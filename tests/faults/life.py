@@ -54,7 +54,7 @@ limits: {{seconds: 20}}
 methods:
   - double_phase
   - {{name: wirtinger, params: {{iterations: 5}}}}
-  - {{name: "mine.py:Mine", captures: 3}}
+  - {{name: "mine.py:mine", captures: 3}}
   - name: parametric_model
     params:
       patterns: 4

@@ -242,7 +242,7 @@ PHOTOGRAPHING = plugins.text("photographing")
 
 def test_a_retry_has_the_captures_of_both_and_a_new_solution_after_a_score_its_own(tmp_path):
     (tmp_path / "mine.py").write_text(PHOTOGRAPHING)
-    config = write_config(tmp_path, ('"mine.py:Mine"',), count=1)
+    config = write_config(tmp_path, ('"mine.py:mine"',), count=1)
     config.write_text(f"{config.read_text()}isolation: none\n")
     fault, store, found = tmp_path / "fail", Store(tmp_path / "out"), list[tuple[str, int]]()
 

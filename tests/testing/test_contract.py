@@ -48,17 +48,13 @@ def spoiled(phases: Tensor, target: Tensor, bench: Any) -> Tensor:
 @dataclass
 class Loose:
     value: float = 1.0
-
-    def solve(self, target: Tensor, bench: Any) -> Tensor:
-        return Good().solve(target, bench)
+    solve = Good.solve
 
 
 @dataclass(frozen=True)
 class Needy:
     value: float
-
-    def solve(self, target: Tensor, bench: Any) -> Tensor:
-        return Good().solve(target, bench)
+    solve = Good.solve
 
 
 @dataclass(frozen=True)

@@ -163,23 +163,11 @@ def test_paths_that_a_method_names_are_known_apart_and_its_call_has_the_threads_
 
 def solved(tmp_path: Path, body: str, top: str = "", **more: str) -> dict[str, Any]:
     """The record of a method of a file, from what is at its top and in its ``solve``."""
-    (tmp_path / "one.py").write_text(
-        f"""import os, time
-from dataclasses import dataclass
-
-import torch
-{top}
-
-
-@dataclass(frozen=True)
-class One:
-    def solve(self, target, bench):
-        {body}
-        return torch.zeros((*target.shape[:2], *bench.spec.shape))
-"""
-    )
-    config = write_study(tmp_path / "study.yaml", "'one.py:One'", limits="{seconds: 60}", **more)
-    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "One")
+    answer = "return torch.zeros((*target.shape[:2], *bench.spec.shape))"
+    code = f"import os, time\nimport torch\n{top}\n\n\ndef one(target, bench):\n    {body}\n    {answer}\n"
+    (tmp_path / "one.py").write_text(code)
+    config = write_study(tmp_path / "study.yaml", "'one.py:one'", limits="{seconds: 60}", **more)
+    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "one")
     return record
 
 
@@ -196,7 +184,7 @@ def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp
 
 def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path, no_physics):
     top = "from holobench_eval.display.simulated.profile import load_profile"
-    with pytest.raises(UserError, match=r"one.py:One' imports holobench_eval.display.simulated.*'isolation: none'"):
+    with pytest.raises(UserError, match=r"one.py:one' imports holobench_eval.display.simulated.*'isolation: none'"):
         solved(tmp_path, "load_profile(bench.spec.name)", top)
     assert solved(tmp_path, "load_profile(bench.spec.name)", top, isolation="none")["state"] == "done"
 

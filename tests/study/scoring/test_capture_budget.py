@@ -20,8 +20,8 @@ def study_of(folder: Path, *methods: str) -> Path:
 
 
 def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path):
-    methods = [f"{name}, captures: 3" for name in ("Greedy", "Deaf", "Modest")]
-    config = study_of(tmp_path, *methods, "Greedy, label: none, captures: 2, params: {keeps: false}", "Lying")
+    methods = [f"{name}, captures: 3" for name in ("greedy", "deaf", "modest")]
+    config = study_of(tmp_path, *methods, "greedy, label: none, captures: 2, params: {keeps: false}", "lying")
     found = compute(config, tmp_path / "out").records
     greedy, deaf, modest, none, lying = (record for record in found if record["cell"]["condition"] != "reference")
     for stopped in (greedy, deaf):
@@ -33,7 +33,7 @@ def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologra
 
 
 def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path):
-    many = ("Modest", "Modest, label: two, captures: 2", "Modest, label: three, captures: 3")
+    many = ("modest", "modest, label: two, captures: 2", "modest, label: three, captures: 3")
     tasks = [task for task in planned(study_of(tmp_path, *many)).tasks if not task.is_floor]
     free, two, _ = (task.cells[0] for task in tasks)
     assert "captures" not in free.phase
@@ -46,8 +46,8 @@ def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_
     ("method", "message"),
     [
         ('"plugins.py:Toy", captures: 3', r":6:\d+: .*plugins.py:Toy' takes no captures .*remove 'captures'"),
-        ("camera.py:Modest, captures: 0", r":6:\d+: .*captures"),
-        ("camera.py:Modest, captures: many", r":6:\d+: .*captures"),
+        ("camera.py:modest, captures: 0", r":6:\d+: .*captures"),
+        ("camera.py:modest, captures: many", r":6:\d+: .*captures"),
     ],
 )
 def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path, method, message):

@@ -30,11 +30,11 @@ def _as_before(monkeypatch):
 
 
 def test_an_honest_method_is_let_through(tmp_path):
-    outcome = compute(study(tmp_path, "Honest"), tmp_path / "out")
+    outcome = compute(study(tmp_path, "honest"), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"done"}
 
 
-@pytest.mark.parametrize("name", ["Flatterer", "Silencer", "Failing"])
+@pytest.mark.parametrize("name", ["flatterer", "silencer", "failing"])
 def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path, name):
     with pytest.raises(StopError, match=rf"method 'methods.py:{name}' has changed the harness: .* leto-mild"):
         compute(study(tmp_path, name), tmp_path / "out")
@@ -44,4 +44,4 @@ def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_
 
 def test_what_the_package_ships_is_not_guarded(tmp_path):
     assert plugins.is_shipped("methods", "wirtinger")
-    assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:Honest")
+    assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:honest")

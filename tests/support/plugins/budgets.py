@@ -1,59 +1,47 @@
 """Methods that keep to their budget of captures, or do not."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import torch
 
 from holobench_eval.core.errors import BudgetError
 
 
-@dataclass(frozen=True)
-class Method:
-    keeps: bool = True
-    camera: ClassVar[bool] = True
-
-    def phase(self, target, bench):
-        return torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
+def flat(target, bench):
+    return torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
 
 
-class Greedy(Method):
+def greedy(target, bench, keeps: bool = True):
     """Captures for ever; hands in its phase first, and other ones never."""
-
-    def solve(self, target, bench):
-        phase = self.phase(target, bench)[0]
-        if self.keeps:
-            bench.keep(phase)
-        while True:
-            bench.capture(phase)
-            phase.fill_(9.0)  # what was handed in is a copy
-
-
-class Modest(Method):
-    """Takes as many captures as it may, and no more."""
-
-    def solve(self, target, bench):
-        for _ in range(bench.budget or 1):
-            bench.capture(self.phase(target, bench)[0])
-        return self.phase(target, bench)
-
-
-class Deaf(Method):
-    """Goes on after the display has ended it, and returns another phase than it has handed in."""
-
-    def solve(self, target, bench):
-        phase = self.phase(target, bench)
+    phase = flat(target, bench)[0]
+    if keeps:
         bench.keep(phase)
-        try:
-            while True:
-                bench.capture(phase[0])
-        except Exception:
-            return phase.fill_(9.0)
+    while True:
+        bench.capture(phase)
+        phase.fill_(9.0)  # what was handed in is a copy
 
 
-class Lying(Method):
+def modest(target, bench):
+    """Takes as many captures as it may, and no more."""
+    for _ in range(bench.budget or 1):
+        bench.capture(flat(target, bench)[0])
+    return flat(target, bench)
+
+
+def deaf(target, bench):
+    """Goes on after the display has ended it, and returns another phase than it has handed in."""
+    phase = flat(target, bench)
+    bench.keep(phase)
+    try:
+        while True:
+            bench.capture(phase[0])
+    except Exception:
+        return phase.fill_(9.0)
+
+
+def lying(target, bench):
     """Says of itself that the display has ended it."""
+    bench.keep(flat(target, bench)[0])
+    raise BudgetError("the best of all methods")
 
-    def solve(self, target, bench):
-        bench.keep(self.phase(target, bench)[0])
-        raise BudgetError("the best of all methods")
+
+for method in (greedy, modest, deaf, lying):
+    method.camera = True

@@ -1,20 +1,17 @@
 """A method that takes two captures, and fails where a file says so."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import torch
 
 
-@dataclass(frozen=True)
-class Mine:
-    camera: ClassVar[bool] = True
+def mine(target, bench):
+    phase = torch.zeros(*target.shape[:2], *bench.spec.shape)
+    for _ in range(2):
+        bench.capture(phase[0])
+    if Path(__file__).with_name("fail").exists():
+        raise ValueError("no light")
+    return phase
 
-    def solve(self, target, bench):
-        phase = torch.zeros(*target.shape[:2], *bench.spec.shape)
-        for _ in range(2):
-            bench.capture(phase[0])
-        if Path(__file__).with_name("fail").exists():
-            raise ValueError("no light")
-        return phase
+
+mine.camera = True
