@@ -16,7 +16,6 @@ from tests.study.studies import planned
 
 FUNCTION = '''
 import torch
-from tests.study.studies import planned
 
 
 def flat(target, bench):

@@ -230,7 +230,7 @@ methods:
   - {name: online_camera, params: {captures: 4, start: {offsets: 1, converged: {iterations: 10}}, checks: 1}}
   - name: parametric_model
     params: {patterns: 2, search: {iterations: 4}, retrieval: {iterations: 8}, training: {rounds: 2, images: 2,
-      refine_images: 1, steps: 60, refine_steps: 30}}
+      refine_images: 1, steps: 200, refine_steps: 100}}
 """
 
 
