@@ -1,6 +1,7 @@
 """A part or a variant of a study: what the command line changes, where faults are told, and what its report says."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study.changes import Changes, noted, recorded
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.study.studies import one_line, planned
+from tests.study.studies import planned
 from tests.study.test_config import FULL, write
 from tests.support.studies.fake_study import write_config
 
@@ -89,7 +90,7 @@ FAULTS = [
 
 @pytest.mark.parametrize(("changes", "message"), FAULTS)
 def test_a_fault_is_told_at_its_option(tmp_path, changes, message):
-    with one_line(message):
+    with pytest.raises(UserError, match=f"^{re.escape(message)}"):
         load_study(write(tmp_path, FULL), changes)
 
 

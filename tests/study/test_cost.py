@@ -3,7 +3,6 @@ import sys
 import weakref
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -73,7 +72,7 @@ def test_without_the_linux_files_time_alone_is_measured(tmp_path, monkeypatch):
 
 def test_what_a_solution_left_in_circles_is_let_go_before_the_next():
     cost.start().stop()
-    left = SimpleNamespace()
+    left = type("Node", (), {})()
     left.own = left
     seen = weakref.ref(left)
     del left

@@ -49,7 +49,9 @@ def version(folder: Path, name: str = "Method") -> str:
     return method_version(plugins.find("methods", f"mine.py:{name}", folder))
 
 
-CALLING = MINE.replace("class Method(Wirtinger): ...", "def Method(*given):\n    return Wirtinger().solve(*given)")
+CALLING = MINE.replace(
+    "class Method(Wirtinger): ...", "def Method(target, bench):\n    return Wirtinger().solve(target, bench)"
+)
 
 
 @pytest.mark.parametrize("text", [MINE, CALLING])

@@ -20,13 +20,13 @@ from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.store import Store
 from holobench_eval.study.versions import HARNESS
 from tests.study.studies import TURNS, add_one_laser, compute, planned
-from tests.support.studies.fake_study import solves, untimed, write_config
+from tests.support.studies.fake_study import solves, untimed, write_config, write_inside
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
 
 def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path):
-    config, output = write_config(tmp_path), tmp_path / "out"
+    config, output = write_inside(tmp_path), tmp_path / "out"
     first = compute(config, output)
     assert {record["state"] for record in first.records} == {"done"}
     assert (first.computed, first.failed, len(first.records)) == (3 * 6 + 3, 0, 3 * 6 + 3)
@@ -41,10 +41,10 @@ def test_what_is_there_is_never_computed_again_and_what_is_missing_is(tmp_path):
     renamed, other = (
         f'{{name: "plugins.py:Toy", label: {label}}}' for label in ("renamed", "other, params: {value: 2}")
     )
-    again = compute(write_config(tmp_path, (renamed,)), output)
+    again = compute(write_inside(tmp_path, (renamed,)), output)
     assert again.computed == 0
     assert {record["label"] for record in again.records[-3:]} == {"renamed"}
-    more = compute(write_config(tmp_path, ("plugins.py:Toy", other)), output)
+    more = compute(write_inside(tmp_path, ("plugins.py:Toy", other)), output)
     assert (more.computed, len(more.records)) == (3, 3 * 6 + 2 * 3)
 
 
@@ -83,7 +83,7 @@ def test_what_is_no_phase_and_no_text_is_a_failed_cell_with_a_reason(tmp_path, n
 
 @pytest.mark.parametrize("executor", [Serial(), Local(2)], ids=["here", "workers"])
 def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path, executor):
-    config, store = write_config(tmp_path, count=1), Store(tmp_path / "out")
+    config, store = write_inside(tmp_path, count=1), Store(tmp_path / "out")
     compute(config, store.output)
     cells = planned(config).cells
     store.remove(cell.id for cell in cells)
@@ -99,14 +99,14 @@ def test_a_full_disk_stops_the_run_and_fails_no_cell(tmp_path, executor):
 
 def test_a_score_that_is_not_finite_is_a_failed_cell(tmp_path, monkeypatch):
     monkeypatch.setattr("holobench_eval.study.scoring.scores.score", lambda *_, **__: {"psnr_linear": float("nan")})
-    records = compute(write_config(tmp_path, count=1), tmp_path / "out").records
+    records = compute(write_inside(tmp_path, count=1), tmp_path / "out").records
     assert {(record["state"], record["reason"]) for record in records} == {("failed", "the score psnr_linear is nan")}
 
 
 def test_targets_keep_their_pictures_when_displays_change_places(tmp_path):
     add_one_laser(tmp_path)
     for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
-        config = write_config(tmp_path, profiles=order, count=1)
+        config = write_inside(tmp_path, profiles=order, count=1)
         layout = layout_of(load_study(config))
         results = Results(records_frame(compute(config, tmp_path / "out").records, layout), layout)
         shapes = [results.shape(results.reference(name)) for name in ("ideal", "one")]
@@ -118,7 +118,7 @@ SAVED = ("captures", ".json"), ("captures", ".png"), ("phases", ".npy"), ("phase
 
 
 def test_captures_and_phases_are_saved_on_request(tmp_path):
-    config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: "a/b"}',), count=1)
+    config = write_inside(tmp_path, ('{name: "plugins.py:Toy", label: "a/b"}',), count=1)
     config.write_text(config.read_text() + "save: {captures: true, phases: true}\n")
     compute(config, tmp_path / "out")
     written = {str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("*/*/*.*")}
@@ -127,14 +127,14 @@ def test_captures_and_phases_are_saved_on_request(tmp_path):
 
 
 def test_a_folder_in_use_by_another_run_is_refused(tmp_path):
-    config = write_config(tmp_path, count=1)
+    config = write_inside(tmp_path, count=1)
     with Store(tmp_path / "out").locked(), pytest.raises(UserError, match="another run is using this folder"):
         compute(config, tmp_path / "out")
     assert compute(config, tmp_path / "out").computed == 5 + 1
 
 
 def test_an_interrupt_keeps_what_was_computed(tmp_path):
-    config = write_config(tmp_path)
+    config = write_inside(tmp_path)
     with patch.object(Lines, "finished", side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
         compute(config, tmp_path / "out")
     assert compute(config, tmp_path / "out").computed == 21 - 6
@@ -143,7 +143,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path):
 
 
 def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlier_run_again(tmp_path):
-    config = write_config(tmp_path)
+    config = write_inside(tmp_path)
     shared = compute(config, tmp_path / "out", executor=TURNS)
     assert [record["alone"] for record in shared.records[-3:]] == [False] * 3
     config.write_text(f"{config.read_text()}timing: alone\n")
@@ -160,18 +160,18 @@ def test_a_study_that_is_to_be_timed_alone_computes_the_timed_cells_of_an_earlie
 def test_workers_that_may_come_time_nothing_alone_unless_asked(tmp_path, monkeypatch):
     monkeypatch.setattr(Address, "workers", 1)
     monkeypatch.setattr(Address, "map", Serial.map)
-    records = compute(write_config(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
+    records = compute(write_inside(tmp_path), tmp_path / "out", executor=Address("tcp://a:1")).records
     assert [record["alone"] for record in records[-3:]] == [False] * 3
 
 
 def test_seconds_are_those_of_the_study_that_reports_them(tmp_path):
-    config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.05}}',), count=1)
+    config = write_inside(tmp_path, ('{name: "plugins.py:Toy", params: {pause: 0.05}}',), count=1)
     first, other, again = (compute(config, tmp_path / name).records[-1]["seconds"] for name in "aba")
     assert other != first == again >= 0.05
 
 
 def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_left_for_it(tmp_path):
-    config, here = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
+    config, here = write_inside(tmp_path, ("plugins.py:Toy", "plugins.py:Needy")), tmp_path / "here"
     with pytest.raises(UserError, match=r"^method 'plugins.py:Needy' cannot run here: no lens; buy one$"):
         compute(config, tmp_path / "out")
     assert solves(tmp_path) == []
@@ -185,7 +185,7 @@ def test_a_method_that_cannot_run_here_is_refused_at_once_where_something_is_lef
 @pytest.mark.parametrize("asked", ["protocol: {metrics: [psnr, lpips_alex]}", "headline: lpips_alex_srgb"])
 def test_a_metric_without_its_weights_is_refused_by_a_run_alone(tmp_path, monkeypatch, asked):
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path / "hub"))
-    config = write_config(tmp_path)
+    config = write_inside(tmp_path)
     config.write_text(f"{config.read_text()}\n{asked}\n")
     assert planned(config).metrics["lpips_alex"] == "v2, 0.1"  # as with the weights
     with pytest.raises(UserError, match="metric 'lpips_alex' cannot be computed here: no trunk weights"):
@@ -194,7 +194,7 @@ def test_a_metric_without_its_weights_is_refused_by_a_run_alone(tmp_path, monkey
 
 
 def test_a_run_says_what_it_ran_on(tmp_path):
-    config = write_config(tmp_path, count=1)
+    config = write_inside(tmp_path, count=1)
     known = compute(config, tmp_path / "out").provenance
     assert known == provenance.read(tmp_path / "out")
     assert known["profiles"]["ideal"]["version"] == 1
@@ -206,12 +206,12 @@ def test_a_run_says_what_it_ran_on(tmp_path):
 
 
 def test_a_run_keeps_the_runs_it_completes_and_is_noted_though_it_needs_nothing_computed(tmp_path):
-    config, store = write_config(tmp_path, count=1), Store(tmp_path / "out")
+    config, store = write_inside(tmp_path, count=1), Store(tmp_path / "out")
     first = compute(config, store.output).provenance
     cells = planned(config).cells
     store.path(cells[0].id).unlink()
     second = compute(config, store.output).provenance
-    config = write_config(tmp_path, ('{name: "plugins.py:Toy", label: renamed}',), count=1)
+    config = write_inside(tmp_path, ('{name: "plugins.py:Toy", label: renamed}',), count=1)
     third = compute(config, store.output).provenance
     assert [run["started"] for run in third["earlier"]] == [first["started"], second["started"]]
     assert third["earlier"][0] == {key: value for key, value in first.items() if key != "earlier"}

@@ -9,6 +9,7 @@ import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -37,16 +38,23 @@ methods:
 
 
 def write_config(
-    folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), count: int = 3, profiles: str = "ideal"
+    folder: Path,
+    methods: tuple[str, ...] = ("plugins.py:Toy",),
+    count: int = 3,
+    profiles: str = "ideal",
+    inside: bool = False,
 ) -> Path:
-    """A config and the plug-ins it names, in a folder."""
+    """A config and the plug-ins it names, in a folder. inside: methods have no process of their own."""
     (folder / "plugins.py").write_text(PLUGINS)
     path = folder / "study.yaml"
     entries = "\n".join(f"  - {method}" for method in methods)
     text = CONFIG.format(methods=entries, count=count, profiles=profiles)
-    privileged = any("Following" in method for method in methods)
-    path.write_text(f"{text}isolation: none\n" if privileged else text)
+    inside = inside or any("Following" in method for method in methods)  # which is privileged
+    path.write_text(f"{text}isolation: none\n" if inside else text)
     return path
+
+
+write_inside = partial(write_config, inside=True)
 
 
 @contextmanager
