@@ -17,7 +17,7 @@ from hypothesis import settings
 from holobench_eval.commands import run as run_command
 from holobench_eval.optics.transfer import kernel
 from holobench_eval.study.scoring import reference
-from tests.support import fake_study
+from tests.support.studies import fake_study
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")

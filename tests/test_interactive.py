@@ -23,32 +23,34 @@ from holobench_eval.report.charts.tiles import GAP, HEADER, SIDE, tile_size
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute, write_study
 
+PHASE = (1, 3, 128, 128)  # what a method returns
+
 
 @pytest.fixture(scope="module")
-def display() -> hb.OpenDisplay:
+def display():
     return hb.open_display("ideal", panel=(128, 128))
 
 
 @pytest.fixture(scope="module")
-def target(display: hb.OpenDisplay) -> interactive.Array:
+def target(display):
     ramp = np.linspace(0, 1, 90, dtype=np.float32)
     return display.target(np.stack([ramp[:, None] * ramp, ramp[:, None] * ramp[::-1], ramp[:, None] + 0 * ramp], -1))
 
 
-def test_the_examples_run() -> None:
+def test_the_examples_run():
     found = doctest.testmod(interactive.opened)
     assert found.attempted
     assert not found.failed
 
 
-def test_what_is_public_is_there_and_nothing_else() -> None:
+def test_what_is_public_is_there_and_nothing_else():
     assert all(getattr(hb, name) is getattr(interactive, name) for name in hb.__all__ if name[0] != "_")
     assert dir(hb) == sorted(hb.__all__)
     with pytest.raises(AttributeError, match="no attribute 'solve'"):
         _ = hb.solve  # type: ignore[attr-defined]
 
 
-def test_frames_of_a_fast_panel_are_one_capture_and_a_slow_one_refuses_them(target: interactive.Array) -> None:
+def test_frames_of_a_fast_panel_are_one_capture_and_a_slow_one_refuses_them(target):
     fast = hb.open_display("plm-4bit", panel=(128, 128))
     draw = np.random.default_rng(1)
     phase = fast.solve(lambda target, bench: draw.uniform(0, 6, (1, 4, 3, 128, 128)), target[:, :104, :104])
@@ -62,7 +64,7 @@ def test_frames_of_a_fast_panel_are_one_capture_and_a_slow_one_refuses_them(targ
 
 
 @pytest.mark.slow
-def test_a_noise_free_display_gives_the_score_of_a_study(tmp_path: Path, display: hb.OpenDisplay) -> None:
+def test_a_noise_free_display_gives_the_score_of_a_study(tmp_path, display):
     config = write_study(
         tmp_path / "study.yaml",
         "{name: gerchberg_saxton, params: {iterations: 3, initial_phase: constant}}",
@@ -91,22 +93,10 @@ def flat(target, bench, level=0.0):
     return Flat(level).solve(target, bench)
 
 
-@dataclass(frozen=True)
-class Random:
-    """A random phase, as a tensor or as an array of NumPy."""
-
-    array: bool = False
-    double: bool = False
-
-    def solve(self, target, bench):
-        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("phase"))
-        phase = phase.double() / 3 if self.double else phase
-        return phase.numpy() if self.array else phase
-
-
-@pytest.mark.parametrize("double", [False, True])
-def test_a_phase_of_numpy_is_that_of_its_tensor(display: hb.OpenDisplay, target, double: bool) -> None:
-    tensor, array = (display.solve(Random(array, double), target) for array in (False, True))
+@pytest.mark.parametrize("kind", [torch.float32, torch.float64])
+def test_a_phase_of_numpy_is_that_of_its_tensor(display, target, kind):
+    phase = 6 * torch.rand(PHASE, dtype=kind)
+    tensor, array = display.solve(lambda *_: phase, target), display.solve(lambda *_: phase.numpy(), target)
     assert array.dtype == tensor.dtype
     assert np.array_equal(array, tensor)
 
@@ -124,7 +114,7 @@ def test_a_phase_of_numpy_is_that_of_its_tensor(display: hb.OpenDisplay, target,
         ("mine.py:flat", {"level": 2.0}),
     ],
 )
-def test_functions_classes_instances_partials_and_files_are_methods(tmp_path: Path, target, method, params) -> None:
+def test_functions_classes_instances_partials_and_files_are_methods(tmp_path, target, method, params):
     (tmp_path / "mine.py").write_text(
         "import torch\ndef flat(target, bench, level: float = 0.0):\n"
         "    return torch.full((*target.shape[:2], *bench.spec.shape), level)\n"
@@ -134,19 +124,16 @@ def test_functions_classes_instances_partials_and_files_are_methods(tmp_path: Pa
         assert np.array_equal(opened.solve(method, given, **params), np.full((3, 128, 128), 2, np.float32))
 
 
-def test_a_failure_is_one_line_and_has_its_cause(display: hb.OpenDisplay, target: interactive.Array) -> None:
+def test_a_failure_is_one_line_and_has_its_cause(display, target):
     def failing(target, bench):
         raise KeyError("two\nlines")
 
-    with pytest.raises(CellError, match=r"^failing: KeyError: ") as found:
+    with pytest.raises(CellError, match=r"^failing: KeyError: .*$") as found:
         display.solve(failing, target)
-    assert "\n" not in str(found.value)
     assert isinstance(found.value.__cause__, KeyError)
 
 
-def test_a_phase_file_is_shown(
-    display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_phase_file_is_shown(display, target, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     levels = np.random.default_rng(0).integers(0, 256, (128, 128, 3), dtype=np.uint8)
     (tmp_path / "phases").mkdir()
@@ -157,7 +144,7 @@ def test_a_phase_file_is_shown(
     assert np.array_equal(display.solve("phases", target, file=Path("phases/cat.npy")), phase)
 
 
-def test_a_camera_is_for_those_who_declare_it(display: hb.OpenDisplay, target: interactive.Array) -> None:
+def test_a_camera_is_for_those_who_declare_it(display, target):
     def with_camera(target, bench, level=0.0):
         bench.capture(torch.full((3, 128, 128), level))
         return flat(target, bench)
@@ -169,7 +156,7 @@ def test_a_camera_is_for_those_who_declare_it(display: hb.OpenDisplay, target: i
         assert display.solve(declared, target).shape == (3, 128, 128)
 
 
-def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path: Path) -> None:
+def test_levels_and_light_give_the_same_target(display, tmp_path):
     gray = np.full((50, 70), 188, np.uint8)
     light = ((188 / 255 + 0.055) / 1.055) ** 2.4
     wanted = np.full((3, *display.spec.region.shape), light)
@@ -179,7 +166,7 @@ def test_levels_and_light_give_the_same_target(display: hb.OpenDisplay, tmp_path
     assert np.array_equal(display.target(np.nextafter(white, 2)), display.target(white))
 
 
-def test_colours_may_come_first_or_last(display: hb.OpenDisplay) -> None:
+def test_colours_may_come_first_or_last(display):
     light = np.random.default_rng(0).random((50, 60, 3), dtype=np.float32)
     wanted = display.target(light)
     assert np.array_equal(display.target(light.transpose(2, 0, 1)), wanted)
@@ -194,21 +181,18 @@ def levels_of(light: interactive.Array) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("full", "kind"), [(255, np.uint8), (65535, np.uint16), (65535, ">u2"), (1, np.float64)])
-def test_levels_of_a_picture_are_scored_as_the_light_that_they_stand_for(display, full, kind) -> None:
+def test_levels_of_a_picture_are_scored_as_the_light_that_they_stand_for(display, full, kind):
     levels = np.random.default_rng(1).integers(0, 256, (3, 104, 104), dtype=np.uint8)
     target = display.target(levels)
     stored = (levels / 255 * full).round(0 if full > 1 else 9).astype(kind)
     assert hb.score(stored, target=target, metrics=["psnr"], values="srgb")["psnr_linear"] == pytest.approx(80, abs=0.1)
 
 
-def test_counts_of_a_camera_are_linear_light_whatever_their_type(target) -> None:
+def test_counts_of_a_camera_are_linear_light_whatever_their_type(target):
     counts = (target * 4095).astype(np.uint16)
     found = hb.score(counts, target=target, metrics=["psnr"], values="linear")
     assert found == hb.score(counts.astype(np.float64), target=target, metrics=["psnr"])
     assert found["psnr_linear"] > 60
-
-
-PHASE = (1, 3, 128, 128)  # what a method returns
 
 
 @pytest.mark.parametrize(
@@ -279,26 +263,28 @@ PHASE = (1, 3, 128, 128)  # what a method returns
         (lambda d, t: hb.load_records("gone"), "no records.csv"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(display, target, call, message) -> None:
+def test_a_mistake_is_told_in_one_line(display, target, call, message):
     with pytest.raises((UserError, CellError), match=message) as found:
         call(display, target)
     assert "\n" not in str(found.value)
 
 
-@pytest.mark.parametrize("taken", [0.1, 2.0])
-def test_light_far_below_zero_is_warned_of(target: interactive.Array, taken: float) -> None:
-    with pytest.warns(UserWarning, match="darker than the target where it is darkest, by more than 5% of its white"):
-        hb.score(np.asarray(target) - taken, target, metrics=["psnr"])
-
-
-def test_colours_in_another_order_are_warned_of(display: hb.OpenDisplay) -> None:
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda light: light - 0.1, "darker than the target where it is darkest, by more than 5% of its white"),
+        (lambda light: light - 2.0, "darker than the target where it is darkest, by more than 5% of its white"),
+        (lambda light: light[::-1], "red and blue are exchanged in the capture or in its target"),
+    ],
+)
+def test_light_far_below_zero_and_colours_in_another_order_are_warned_of(display, change, said):
     light = display.target(data.astronaut())
-    with pytest.warns(UserWarning, match="red and blue are exchanged in the capture or in its target"):
-        hb.score(np.asarray(light)[::-1], light, metrics=["psnr"])
+    with pytest.warns(UserWarning, match=said):
+        hb.score(change(np.asarray(light)), light, metrics=["psnr"])
 
 
 @pytest.mark.parametrize("kind", ["f4", "f8", ">f4"])
-def test_levels_as_floating_point_are_warned_of_and_light_is_not(display: hb.OpenDisplay, kind: str) -> None:
+def test_levels_as_floating_point_are_warned_of_and_light_is_not(display, kind):
     levels = data.astronaut()
     with pytest.warns(UserWarning, match="all values are levels of 255, as of a picture in sRGB, and are taken as"):
         display.target((levels / 255).astype(kind))
@@ -313,13 +299,7 @@ def test_levels_as_floating_point_are_warned_of_and_light_is_not(display: hb.Ope
         hb.score(part, part, metrics=["psnr"])
 
 
-def test_a_folder_is_no_picture(target: interactive.Array, tmp_path: Path) -> None:
-    (tmp_path / "a.png").mkdir()
-    with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):
-        hb.compare(target, {"same": target}, tmp_path / "a.png")
-
-
-def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: interactive.Array, tmp_path: Path) -> None:
+def test_captures_are_compared_in_a_picture(display, target, tmp_path):
     mirrored, turned = target[:, :, ::-1], target[:, ::-1]
     path = hb.compare(target, {"mirrored": mirrored / 4, "turned": 3 * turned}, tmp_path / "new" / "compared.png")
     page = np.asarray(Image.open(path)).astype(int)
@@ -335,20 +315,21 @@ def test_captures_are_compared_in_a_picture(display: hb.OpenDisplay, target: int
         assert wrong.mean() < (0.01 if column == 0 else 1e-9)  # the target has a frame around the enlarged window
 
 
-@pytest.mark.parametrize(("ending", "format"), [(".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")])
-def test_the_ending_says_what_a_comparison_is(
-    target: interactive.Array, tmp_path: Path, ending: str, format: str
-) -> None:
-    path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
-    assert Image.open(path).format == format
+def test_the_ending_says_what_a_comparison_is_and_a_folder_is_none(target, tmp_path):
+    for ending, form in ((".png", "PNG"), (".PNG", "PNG"), (".jpg", "JPEG"), (".JPEG", "JPEG")):
+        path = hb.compare(target, {"same": target}, tmp_path / f"compared{ending}")
+        assert Image.open(path).format == form
+    (tmp_path / "a.png").mkdir()
+    with pytest.raises(UserError, match=r"a\.png' is a folder; expected a file in it"):
+        hb.compare(target, {"same": target}, tmp_path / "a.png")
 
 
-def test_records_of_a_report_are_read() -> None:
+def test_records_of_a_report_are_read():
     records = hb.load_records(Path(__file__).parents[1] / "reports" / "table3")
     assert {"method", "condition", "target", "psnr_linear_db"} <= set(records.columns)
 
 
-def test_what_python_shows_is_a_line_that_says_what_it_is(display: hb.OpenDisplay, target: interactive.Array) -> None:
+def test_what_python_shows_is_a_line_that_says_what_it_is(display, target):
     phase = display.solve("double_phase", target)
     capture = display.capture(phase, target)
     scores = hb.score(capture, target)
@@ -375,9 +356,7 @@ def test_what_python_shows_is_a_line_that_says_what_it_is(display: hb.OpenDispla
     assert np.array_equal(display.solve(lambda *_: phase[None], target), phase)
 
 
-def test_a_score_takes_its_arrays_by_position_and_notices_that_they_changed_places(
-    display: hb.OpenDisplay, target: interactive.Array
-) -> None:
+def test_a_score_takes_its_arrays_by_position_and_notices_that_they_changed_places(display, target):
     capture = display.capture(display.solve("double_phase", target), target)
     assert hb.score(capture, target, ["psnr"]) == hb.score(capture, target=target, metrics=["psnr"])
     for call in (hb.score, hb.picture):
@@ -385,7 +364,7 @@ def test_a_score_takes_its_arrays_by_position_and_notices_that_they_changed_plac
             call(target, capture)
 
 
-def test_a_picture_is_the_capture_as_it_is_scored(display: hb.OpenDisplay, target: interactive.Array) -> None:
+def test_a_picture_is_the_capture_as_it_is_scored(display, target):
     picture = hb.picture(target / 3, target)
     assert (picture.shape, picture.dtype) == ((104, 104, 3), np.uint8)
     assert np.array_equal(picture, np.asarray(levels_of(target)).transpose(1, 2, 0))
@@ -393,7 +372,7 @@ def test_a_picture_is_the_capture_as_it_is_scored(display: hb.OpenDisplay, targe
 
 
 @pytest.mark.parametrize("convention", [{}, {"two_pi_level": [200, 220, 240.5], "sign": -1, "flip_vertical": True}])
-def test_levels_of_a_phase_are_read_back(display: hb.OpenDisplay, target, convention, tmp_path: Path) -> None:
+def test_levels_of_a_phase_are_read_back(display, target, convention, tmp_path):
     phase = display.solve("double_phase", target)
     path = hb.save_levels(phase, tmp_path / "new" / "levels.png", **convention)
     assert Image.open(path).size == (128, 128)
@@ -416,7 +395,7 @@ def test_levels_of_a_phase_are_read_back(display: hb.OpenDisplay, target, conven
         (lambda phase: phase, {"correction": {"file": "gone.png"}}, "gone.png"),
     ],
 )
-def test_what_is_no_phase_is_not_saved(display, target, tmp_path: Path, change, convention, message) -> None:
+def test_what_is_no_phase_is_not_saved(display, target, tmp_path, change, convention, message):
     with pytest.raises(UserError, match=message) as caught:
         hb.save_levels(change(display.solve("double_phase", target)), tmp_path / "levels.png", **convention)
     assert "\n" not in str(caught.value)
@@ -432,19 +411,15 @@ def test_what_is_no_phase_is_not_saved(display, target, tmp_path: Path, change, 
         (0.8, {}, ["the phase has values from 0.00 to 0.80, as turns or amplitudes have"]),
     ],
 )
-def test_a_phase_in_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(
-    tmp_path: Path, turn: float, convention: dict[str, int], says: list[str]
-) -> None:
+def test_degrees_and_a_turn_out_of_reach_are_warned_of_where_levels_are_saved(tmp_path, turn, convention, says):
     phase = turn * np.linspace(0, 0.999, 64 * 64).reshape(1, 64, 64)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         hb.save_levels(phase, tmp_path / "levels.png", **convention)
-    said = [str(each.message) for each in caught]
-    assert len(said) == len(says)
-    assert all(part in line for part, line in zip(says, said, strict=True))
+    assert all(part in str(each.message) for part, each in zip(says, caught, strict=True))
 
 
-def test_an_array_made_like_one_of_a_display_is_plain(display: hb.OpenDisplay, target: interactive.Array) -> None:
+def test_an_array_made_like_one_of_a_display_is_plain(display, target):
     phase = np.zeros_like(target, shape=(3, *display.spec.shape))
     assert getattr(phase, "what", "") == ""
     assert getattr(target[:, ::2], "what", "") == getattr(target, "what", "") != ""

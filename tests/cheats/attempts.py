@@ -5,8 +5,6 @@
 keeps a method from it, and docs/start/trust.md says so). ``calls``: 2 for what one call could do to the next.
 """
 
-from __future__ import annotations
-
 import builtins
 import copy
 import ctypes
@@ -43,6 +41,10 @@ class Attempt:
     reason: ClassVar[str] = ""
     calls: ClassVar[int] = 1
 
+    def __init_subclass__(cls, reason="", **known):
+        for name, value in (known | ({"outcome": "refused", "reason": reason} if reason else {})).items():
+            setattr(cls, name, value)
+
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape))
 
@@ -53,63 +55,48 @@ class Attempt:
     def cheat(self, target, bench): ...
 
 
-class Honest(Attempt):
-    kind = "none"
+class Honest(Attempt, kind="none"): ...
 
 
-class Beside(Attempt):
-    kind = "none"
+class Beside(Attempt, kind="none"): ...
 
 
 # --- reads the bench
 
 
-class ReadsTheBench(Attempt):
-    kind = "reads the bench"
+class ReadsTheBench(Attempt, kind="reads the bench"): ...
 
 
-class AsksForTheSimulation(ReadsTheBench):
-    outcome, reason = "refused", "privileged = True"
-
+class AsksForTheSimulation(ReadsTheBench, reason="privileged = True"):
     def cheat(self, target, bench):
         bench.simulation.expected(self.phase(target, bench)[0], target[0])
 
 
-class AsksForOtherHolograms(ReadsTheBench):
-    outcome, reason = "refused", "privileged = True"
-
+class AsksForOtherHolograms(ReadsTheBench, reason="privileged = True"):
     def cheat(self, target, bench):
         return bench.starts
 
 
-class ReadsPrivateNames(ReadsTheBench):
-    outcome, reason = "refused", "_display"
-
+class ReadsPrivateNames(ReadsTheBench, reason="_display"):
     def cheat(self, target, bench):
         return bench._display.bench.profile
 
 
-class ImportsTheBench(ReadsTheBench):
-    outcome, reason = "refused", "not for methods"
-
+class ImportsTheBench(ReadsTheBench, reason="not for methods"):
     def cheat(self, target, bench):
         from holobench_eval.display.simulated.profile import load_profile
 
         load_profile(bench.spec.name)
 
 
-class ImportsTheBenchByItsShortName(ReadsTheBench):
-    outcome, reason = "refused", "ImportError"
-
+class ImportsTheBenchByItsShortName(ReadsTheBench, reason="ImportError"):
     def cheat(self, target, bench):
         from holobench_eval.display import load_profile
 
         load_profile(bench.spec.name)
 
 
-class ImportsTheHarness(ReadsTheBench):
-    outcome, reason = "refused", "not for methods"
-
+class ImportsTheHarness(ReadsTheBench, reason="not for methods"):
     def cheat(self, target, bench):
         from holobench_eval.study.opening import open_bench
 
@@ -130,25 +117,18 @@ class WalksTheStack(ReadsTheBench):
             frame = frame.f_back
 
 
-class FollowsTheGradientOfACapture(ReadsTheBench):
-    outcome, reason = "refused", "does not require grad"
-    camera: ClassVar[bool] = True
-
+class FollowsTheGradientOfACapture(ReadsTheBench, reason="does not require grad", camera=True):
     def cheat(self, target, bench):
         phase = self.phase(target, bench)[0].requires_grad_()
         bench.capture(phase).linear().sum().backward()
 
 
-class RequestsTheSimulation(ReadsTheBench):
-    outcome, reason = "refused", "there is no 'simulation' here"
-
+class RequestsTheSimulation(ReadsTheBench, reason="there is no 'simulation' here"):
     def cheat(self, target, bench):
         bench._ask("simulation")
 
 
-class RequestsTheDisplay(ReadsTheBench):
-    outcome, reason = "refused", "there is no '_display' here"
-
+class RequestsTheDisplay(ReadsTheBench, reason="there is no '_display' here"):
     def cheat(self, target, bench):
         bench._ask("_display")
 
@@ -156,8 +136,7 @@ class RequestsTheDisplay(ReadsTheBench):
 # --- patches the harness
 
 
-class PatchesTheHarness(Attempt):
-    kind = "patches the harness"
+class PatchesTheHarness(Attempt, kind="patches the harness"): ...
 
 
 class PatchesTheMatch(PatchesTheHarness):
@@ -220,10 +199,7 @@ class ChangesTheEnvironment(PatchesTheHarness):
 # --- exceeds the budget
 
 
-class Photographer(Attempt):
-    kind = "exceeds the budget"
-    camera: ClassVar[bool] = True
-
+class Photographer(Attempt, kind="exceeds the budget", camera=True):
     def photographed(self, phase, handles):
         """Captures taken before every handle refuses."""
         taken = 0
@@ -277,18 +253,14 @@ class PhotographsMoreThanOne(Photographer):
         self.photographed(self.phase(target, bench).expand(64, -1, -1, -1), [bench])
 
 
-class PhotographsAfterItsAnswer(Photographer):
-    calls = 2
-
+class PhotographsAfterItsAnswer(Photographer, calls=2):
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         self.photographed(self.phase(target, bench)[0], [bench] * 20)
 
 
-class RectifiesAForgedFrame(Photographer):
+class RectifiesAForgedFrame(Photographer, reason="as capture returned it"):
     """Which would show where the camera stands, without a capture."""
-
-    outcome, reason = "refused", "as capture returned it"
 
     def cheat(self, target, bench):
         capture = bench.capture(self.phase(target, bench)[0])
@@ -301,9 +273,7 @@ class RaisesItsBudget(Photographer):
         self.photographed(self.phase(target, bench)[0], [bench] * 10)
 
 
-class PhotographsWithoutACamera(Attempt):
-    kind, outcome, reason = "exceeds the budget", "refused", "declares no camera"
-
+class PhotographsWithoutACamera(Attempt, kind="exceeds the budget", reason="declares no camera"):
     def cheat(self, target, bench):
         bench.capture(self.phase(target, bench)[0])
 
@@ -311,29 +281,22 @@ class PhotographsWithoutACamera(Attempt):
 # --- lies about time
 
 
-class LiesAboutTime(Attempt):
-    kind = "lies about time"
+class LiesAboutTime(Attempt, kind="lies about time"): ...
 
 
 @dataclass(frozen=True)
-class WorksBeforeItIsAsked(LiesAboutTime):
-    slow: ClassVar[bool] = True
-
+class WorksBeforeItIsAsked(LiesAboutTime, slow=True):
     def __post_init__(self):
         time.sleep(0.4)
 
 
-class StopsTheClock(LiesAboutTime):
-    slow: ClassVar[bool] = True
-
+class StopsTheClock(LiesAboutTime, slow=True):
     def cheat(self, target, bench):
         time.perf_counter = time.monotonic = time.time = lambda: 0.0
         time.sleep(0.4)
 
 
-class ReturnsAPromise(LiesAboutTime):
-    outcome, reason = "refused", "a value is function"
-
+class ReturnsAPromise(LiesAboutTime, reason="a value is function"):
     def phase(self, target, bench):
         return lambda: torch.zeros((*target.shape[:2], *bench.spec.shape))
 
@@ -357,19 +320,15 @@ class FinishesInAnotherProcess(LiesAboutTime):
         return phase
 
 
-class AnswersTwice(LiesAboutTime):
+class AnswersTwice(LiesAboutTime, calls=2):
     """The second answer is the better one, and outside the clock."""
-
-    calls = 2
 
     def cheat(self, target, bench):
         bench._channel.send({"result": self.phase(target, bench), "seen": {}})
         time.sleep(0.3)
 
 
-class SetsItsPeakBack(LiesAboutTime):
-    mib: ClassVar[int] = 150
-
+class SetsItsPeakBack(LiesAboutTime, mib=150):
     def cheat(self, target, bench):
         held = bytearray(b"1") * self.mib * 2**20
         time.sleep(0.3)
@@ -385,19 +344,13 @@ print(1, flush=True)
 while {more}: pass"""
 
 
-class HasAnotherWork(LiesAboutTime):
-    mib: ClassVar[int] = 150
-    cpu: ClassVar[float] = 0.4
-
+class HasAnotherWork(LiesAboutTime, mib=150, cpu=0.4):
     def cheat(self, target, bench):
         subprocess.run([sys.executable, "-c", BURNS.format(more=False)], stdout=subprocess.DEVNULL, check=True)
 
 
-class LeavesAnotherAtWork(LiesAboutTime):
+class LeavesAnotherAtWork(LiesAboutTime, mib=150, cpu=0.3):
     """Of a session of its own, so that it might go on beside the methods that are timed after it."""
-
-    mib: ClassVar[int] = 150
-    cpu: ClassVar[float] = 0.3
 
     def cheat(self, target, bench):
         command = [sys.executable, "-c", BURNS.format(more=True)]
@@ -405,10 +358,8 @@ class LeavesAnotherAtWork(LiesAboutTime):
         left.stdout.readline()
 
 
-class LeavesAnOrphanAtWork(LiesAboutTime):
+class LeavesAnOrphanAtWork(LiesAboutTime, cpu=0.3):
     """Whose parent has ended, so that no tree of processes has it below this one."""
-
-    cpu: ClassVar[float] = 0.3
 
     def cheat(self, target, bench):
         ready, told = os.pipe()
@@ -442,10 +393,8 @@ def outside():
     return numbers - {0, os.getpid()}
 
 
-class Reaching(Attempt):
+class Reaching(Attempt, kind="reaches the process that scores"):
     """Only from a namespace of its own, whose first process has forked it: without one it would really reach others."""
-
-    kind = "reaches the process that scores"
 
     def solve(self, target, bench):
         return super().solve(target, bench) if os.getppid() == 1 else self.phase(target, bench)
@@ -530,8 +479,7 @@ class SlowsTheScorer(ReachingFurther):
 # --- keeps state
 
 
-class KeepsState(Attempt):
-    kind, calls = "keeps state", 2
+class KeepsState(Attempt, kind="keeps state", calls=2): ...
 
 
 class CountsItsCalls(KeepsState):
@@ -572,27 +520,20 @@ class Dressed(torch.Tensor):
         return torch.ones(3, 128, 128)
 
 
-class PoisonsRecords(Attempt):
-    kind = "poisons records"
+class PoisonsRecords(Attempt, kind="poisons records"): ...
 
 
-class ReturnsADressedTensor(PoisonsRecords):
-    outcome, reason = "refused", "a value is Dressed"
-
+class ReturnsADressedTensor(PoisonsRecords, reason="a value is Dressed"):
     def phase(self, target, bench):
         return torch.zeros((*target.shape[:2], *bench.spec.shape)).as_subclass(Dressed)
 
 
-class ReturnsNotANumber(PoisonsRecords):
-    outcome, reason = "refused", "NaN or infinite"
-
+class ReturnsNotANumber(PoisonsRecords, reason="NaN or infinite"):
     def phase(self, target, bench):
         return super().phase(target, bench) * float("nan")
 
 
-class ReturnsTooMuch(PoisonsRecords):
-    outcome, reason = "refused", "not a phase"
-
+class ReturnsTooMuch(PoisonsRecords, reason="not a phase"):
     def phase(self, target, bench):
         return torch.zeros((64, *target.shape[1:]))
 
@@ -602,10 +543,7 @@ class WritesToItsTarget(PoisonsRecords):
         target.zero_()
 
 
-class SendsItsOwnResult(PoisonsRecords):
-    calls = 2
-    outcome, reason = "refused", "returned dict, not a phase"
-
+class SendsItsOwnResult(PoisonsRecords, calls=2, reason="returned dict, not a phase"):
     def cheat(self, target, bench):
         bench._channel.send({"result": {"psnr_linear": 100.0}, "seen": {}})
 
@@ -616,24 +554,17 @@ class FloodsTheTerminal(PoisonsRecords):
             os.write(stream, b"\x1b[2J\x1b]0;better\x07\r" * 2**10)
 
 
-class SendsAPickle(PoisonsRecords):
-    calls = 2
-    outcome, reason = "refused", "no answer"
-
+class SendsAPickle(PoisonsRecords, calls=2, reason="no answer"):
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(pickle.dumps(os.getcwd))
 
 
-class SendsBrackets(PoisonsRecords):
-    outcome, reason = "refused", "no answer"
-
+class SendsBrackets(PoisonsRecords, reason="no answer"):
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(b"[" * 200_000)
 
 
-class ClaimsAHugeTensor(PoisonsRecords):
-    outcome, reason = "refused", "no answer"
-
+class ClaimsAHugeTensor(PoisonsRecords, reason="no answer"):
     def cheat(self, target, bench):
         bench._channel.connection.send_bytes(b'["tensor", "float32", [1000000, 1000000]]')
 
@@ -641,91 +572,66 @@ class ClaimsAHugeTensor(PoisonsRecords):
 # --- ends the process
 
 
-class Ender(Attempt):
-    kind, outcome = "ends the process", "refused"
+class Ender(Attempt, kind="ends the process", outcome="refused"): ...
 
 
-class Exits(Ender):
-    reason = "exit code 0"
-
+class Exits(Ender, reason="exit code 0"):
     def cheat(self, target, bench):
         os._exit(0)
 
 
-class Aborts(Ender):
-    reason = "SIGABRT"
-
+class Aborts(Ender, reason="SIGABRT"):
     def cheat(self, target, bench):
         os.abort()
 
 
-class ReadsNowhere(Ender):
-    reason = "SIGSEGV"
-
+class ReadsNowhere(Ender, reason="SIGSEGV"):
     def cheat(self, target, bench):
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         ctypes.string_at(0)
 
 
-class Interrupts(Ender):
-    reason = "KeyboardInterrupt"
-
+class Interrupts(Ender, reason="KeyboardInterrupt"):
     def cheat(self, target, bench):
         raise KeyboardInterrupt
 
 
-class LeavesPython(Ender):
-    reason = "SystemExit"
-
+class LeavesPython(Ender, reason="SystemExit"):
     def cheat(self, target, bench):
         sys.exit(0)
 
 
-class ClaimsToWait(Ender):
-    reason = "Pending"
-
+class ClaimsToWait(Ender, reason="Pending"):
     def cheat(self, target, bench):
         from holobench_eval.core.errors import Pending
 
         raise Pending
 
 
-class ClaimsThatTheDiskIsFull(Ender):
-    reason = "StorageError"
-
+class ClaimsThatTheDiskIsFull(Ender, reason="StorageError"):
     def cheat(self, target, bench):
         from holobench_eval.core.errors import StorageError
 
         raise StorageError("the disk is full")
 
 
-class KillsItsParent(Attempt):
-    calls = 2
-    kind = "ends the process"
-
+class KillsItsParent(Attempt, calls=2, kind="ends the process"):
     def cheat(self, target, bench):
         os.kill(os.getppid(), signal.SIGKILL)
 
 
-class ClosesEverything(Ender):
-    calls = 2
-    reason = "process of the method"
-
+class ClosesEverything(Ender, calls=2, reason="process of the method"):
     def cheat(self, target, bench):
         os.closerange(3, 256)
 
 
-class RunsForEver(Ender):
-    reason = "took more than"
-
+class RunsForEver(Ender, reason="took more than"):
     def cheat(self, target, bench):
         while True:
             time.sleep(1)
 
 
-class ForbidsItsEnd(Ender):
-    reason = "took more than"
-
+class ForbidsItsEnd(Ender, reason="took more than"):
     def cheat(self, target, bench):
         signal.pthread_sigmask(signal.SIG_BLOCK, range(1, signal.NSIG))
         while True:
@@ -733,26 +639,20 @@ class ForbidsItsEnd(Ender):
                 time.sleep(1)
 
 
-class AnswersWithoutAnEnd(Ender):
+class AnswersWithoutAnEnd(Ender, reason="took more than"):
     """A message of a million bytes, of which few come."""
-
-    reason = "took more than"
 
     def cheat(self, target, bench):
         os.write(bench._channel.connection.fileno(), struct.pack("!i", 10**6) + b"[")
         time.sleep(3600)
 
 
-class StopsItself(Ender):
-    reason = "took more than"
-
+class StopsItself(Ender, reason="took more than"):
     def cheat(self, target, bench):
         os.kill(os.getpid(), signal.SIGSTOP)
 
 
-class TakesAllMemory(Ender):
-    reason = "memory"
-
+class TakesAllMemory(Ender, reason="memory"):
     def cheat(self, target, bench):
         return [torch.ones(2**26) for _ in range(64)]
 
@@ -760,18 +660,14 @@ class TakesAllMemory(Ender):
 # --- exploits the noise's seed
 
 
-class ForeseesTheNoise(Attempt):
-    kind, outcome, reason = "exploits the noise's seed", "refused", "_names"
-
+class ForeseesTheNoise(Attempt, kind="exploits the noise's seed", reason="_names"):
     def cheat(self, target, bench):
         from holobench_eval.core.seeds import generator
 
         return torch.randn(4, generator=generator("bench noise", *bench._names))
 
 
-class AsksForTheSeed(Attempt):
-    kind, outcome, reason = "exploits the noise's seed", "refused", "seed"
-
+class AsksForTheSeed(Attempt, kind="exploits the noise's seed", reason="seed"):
     def cheat(self, target, bench):
         return bench._ask("seed")
 
@@ -779,8 +675,7 @@ class AsksForTheSeed(Attempt):
 # --- trains on the target
 
 
-class Trained(Attempt):
-    kind, outcome, reason = "trains on the target", "refused", "no image it may be trained with"
+class Trained(Attempt, kind="trains on the target", reason="no image it may be trained with"):
     trains: ClassVar[bool] = True
 
     def prepare(self, bench):
@@ -809,9 +704,7 @@ class WritesToATrainingImage(Trained):
         return bench.images[0]
 
 
-class TrainsBeyondItsBudget(Trained):
-    reason = "capture"
-
+class TrainsBeyondItsBudget(Trained, reason="capture"):
     def prepare(self, bench):
         for number in range(100):
             super().prepare(bench) if number else copy.copy(bench)
@@ -824,13 +717,10 @@ class TrainsBeyondItsBudget(Trained):
 # --- what a process of its own does not prevent
 
 
-class Trusted(Attempt):
-    kind, outcome = "leaves its process", "trusted"
+class Trusted(Attempt, kind="leaves its process", outcome="trusted"): ...
 
 
-class KeepsAFile(Trusted):
-    calls = 2
-
+class KeepsAFile(Trusted, calls=2):
     def cheat(self, target, bench):
         file = Path(__file__).with_name("kept.bin")
         seen = file.read_bytes() if file.exists() else b""

@@ -1,7 +1,5 @@
 """What comes of methods that cheat: nothing that another method's digits, or their own, would show."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from pathlib import Path
@@ -55,7 +53,7 @@ methods:
 
 
 @pytest.fixture(scope="module")
-def studies(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[Any]]]:
+def studies(tmp_path_factory):
     """All attempts, together with those that need as many calls and as long a limit."""
     alike: dict[tuple[int, float], list[str]] = {}
     for name in NAMES:
@@ -66,7 +64,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[Any
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
+def alone(tmp_path_factory):
     """A study without a cheat, its honest methods inside."""
     return scored(tmp_path_factory.mktemp("alone"), [], 2, 60.0, isolation="none")
 
@@ -75,7 +73,7 @@ def digits(found: list[Any]) -> list[Any]:
     return [[record.get(name) for name in DIGITS] for record in found]
 
 
-def test_the_page_on_trust_counts_the_attempts() -> None:
+def test_the_page_on_trust_counts_the_attempts():
     cheats = [getattr(attempts, name) for name in NAMES if name != "Honest"]
     page = (Path(__file__).parents[2] / "docs/start/trust.md").read_text()
     counts = Counter((cheat.kind, cheat.outcome) for cheat in cheats)
@@ -86,7 +84,7 @@ def test_the_page_on_trust_counts_the_attempts() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_attempt_has_its_outcome(name: str, studies: list[dict[str, Any]], alone: dict[str, Any]) -> None:
+def test_an_attempt_has_its_outcome(name, studies, alone):
     attempt = getattr(attempts, name)
     (found,) = (study[name] for study in studies if name in study)
     assert len(found) == attempt.calls
@@ -105,8 +103,6 @@ def test_an_attempt_has_its_outcome(name: str, studies: list[dict[str, Any]], al
 
 
 @pytest.mark.parametrize("label", ["beside", "double_phase"])
-def test_no_attempt_changes_a_digit_of_the_methods_beside_it(
-    label: str, studies: list[dict[str, Any]], alone: dict[str, Any]
-) -> None:
+def test_no_attempt_changes_a_digit_of_the_methods_beside_it(label, studies, alone):
     for study in studies:
         assert digits(study[label]) == digits(alone[label][: len(study[label])])

@@ -1,7 +1,5 @@
 """A command as a person calls it, and where it computes."""
 
-from collections.abc import Callable
-
 import pytest
 
 from holobench_eval.study import executors
@@ -9,7 +7,7 @@ from tests.commands.test_commands import holoeval
 
 
 @pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def call(monkeypatch, capsys):
     """Calls a command: its exit code, and what it prints, last of it the errors."""
 
     def called(*arguments: object) -> tuple[int, str, str]:
@@ -19,6 +17,6 @@ def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.fixture
-def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def in_process(monkeypatch):
     """A run computes in the process of the tests, as on one core: workers begin with nothing open."""
     monkeypatch.setattr(executors, "_cores", lambda: 1)

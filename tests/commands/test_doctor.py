@@ -1,6 +1,5 @@
 import json
 import shlex
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -52,17 +51,16 @@ def test_devices_and_what_keeps_them_from_answering_are_listed(quick):
     assert all(each.remedy for each in findings if each.state != "ok")
     assert not [each for each in findings if "docs/" in each.found + each.remedy]  # which a wheel lacks
     assert named(findings, "panels: monitor") == Finding("panels: monitor", "ok", "2.1; HDMI-2, 1920x1080")
-    absent = named(findings, "panels: slmsuite")
+    absent, silent = named(findings, "panels: slmsuite"), named(findings, "cameras: gphoto2")
     assert (absent.state, absent.remedy) == ("missing", "pip install 'x[slmsuite]'")
-    silent = named(findings, "cameras: gphoto2")
     assert (silent.state, silent.found) == ("missing", "2.6; no device answers")
 
 
 def test_a_machine_without_the_compiler_gets_one_line_and_is_not_broken(quick):
     fault = {"errors": {}, "threads": 2, "gpus": [], "kernel": "ModuleNotFoundError: No module named 'numba'"}
     quick.setattr(module, "_ask", lambda code, *_: DEVICES if "drivers" in code else fault)
-    lines = [each for each in examine() if "numba" in each.what + each.found + each.remedy]
-    assert [(each.what, each.state, each.remedy) for each in lines] == [("propagation", "missing", installing("numba"))]
+    (line,) = (each for each in examine() if "numba" in each.what + each.found + each.remedy)
+    assert (line.what, line.state, line.remedy) == ("propagation", "missing", installing("numba"))
 
 
 def test_versions_that_differ_from_the_pinned_ones_are_told_with_the_constraints_that_ship(quick):
@@ -119,17 +117,14 @@ def test_a_full_disk_no_git_and_a_check_that_fails_are_told(quick):
     quick.setattr(module.shutil, "disk_usage", lambda path: SimpleNamespace(free=1e8))
     quick.setattr(module.shutil, "which", lambda program: None)
     findings = examine()
-    assert named(findings, "disk").state == "warning"
-    assert named(findings, "git").state == "missing"
+    assert [named(findings, what).state for what in ("disk", "git")] == ["warning", "missing"]
     quick.setattr(module.shutil, "disk_usage", lambda path: {}["odd\nmachine"])
     found = named(examine(), "disk")
     assert (found.state, found.found) == ("warning", "could not be looked at: KeyError: 'odd\\nmachine'")
 
 
 def test_what_hangs_is_cut_off_and_what_crashes_is_told():
-    started = time.monotonic()
     assert _ask("import time; time.sleep(10_000)", 1.0) == "takes longer than 1 s"
-    assert time.monotonic() - started < PATIENCE
     assert str(_ask("import os; os.abort()", PATIENCE)).startswith("ends with -6")
     assert _ask("raise SystemExit('no bus')", PATIENCE) == "ends with 1: no bus"
     assert _ask(f"print('chatter'); print({json.dumps([1, 2])!r})", 20.0) == [1, 2]

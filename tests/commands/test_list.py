@@ -15,15 +15,13 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.core.parameters import parameters
 
 
-def test_configs_lists_every_study_that_ships(capsys: pytest.CaptureFixture[str]) -> None:
+def test_configs_lists_every_study_that_ships(capsys):
     configs()
     printed = capsys.readouterr().out
     assert all(f" {file.stem} " in printed for file in Path("configs").glob("*.yaml"))
 
 
-def test_functions_of_a_file_are_shown_with_their_parameters_if_they_have_any(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_functions_of_a_file_are_shown_with_their_parameters_if_they_have_any(tmp_path, capsys):
     lines = ["def solve(target, bench, steps: int = 3):", '    """A flat phase.', "", "    steps: how many", '    """']
     lines += ["def flat(target, bench):", '    """A flat phase."""']
     (tmp_path / "mine.py").write_text("\n".join(lines))
@@ -40,13 +38,13 @@ def test_functions_of_a_file_are_shown_with_their_parameters_if_they_have_any(
 
 
 @pytest.mark.parametrize("kind", ["methods", "datasets"])
-def test_every_parameter_of_what_ships_has_a_meaning(kind: plugins.Kind) -> None:
+def test_every_parameter_of_what_ships_has_a_meaning(kind):
     for name in plugins.names(kind):
         assert [entry.name for entry in parameters(plugins.find(kind, name)) if not entry.meaning] == [], name
 
 
 @pytest.fixture(scope="module")
-def pages() -> dict[str, str]:
+def pages():
     """All that ``holoeval list`` and ``holoeval list NAME`` print, in one line each, without links and paths."""
     found, entries = {}, {kind: list(listed()) for kind, (listed, _) in KINDS.items()}
     with pytest.MonkeyPatch.context() as patch:
@@ -73,9 +71,7 @@ SAID = {
 }
 
 
-def test_a_display_says_how_many_frames_it_shows_and_whether_it_is_too_far(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_display_says_how_many_frames_it_shows_and_whether_it_is_too_far(tmp_path, capsys):
     list_("flc-1bit")
     assert "up to 8 frames an exposure" in capsys.readouterr().out
     far = tmp_path / "far.yaml"
@@ -87,11 +83,11 @@ def test_a_display_says_how_many_frames_it_shows_and_whether_it_is_too_far(
 
 
 @pytest.mark.parametrize("name", SAID)
-def test_a_page_says_what_a_name_of_its_kind_needs(pages: dict[str, str], name: str) -> None:
+def test_a_page_says_what_a_name_of_its_kind_needs(pages, name):
     assert [words for words in SAID[name] if words not in pages[name]] == []
 
 
-def test_everything_that_is_listed_can_be_explained(pages: dict[str, str]) -> None:
+def test_everything_that_is_listed_can_be_explained(pages):
     assert [name for name, text in pages.items() if name != "overview" and f"{name}, one of the " not in text] == []
 
 
@@ -122,7 +118,7 @@ DIV2K_valid_HR AUTO ASM DIM ASM_FRESNEL DIM_FRESNEL SIGGRAPH CGH
         ("pointers into the code", r"\b[Ss]ee (?!through)\w+"),
     ],
 )
-def test_what_is_listed_says_things_without_names_of_the_code(pages: dict[str, str], what: str, pattern: str) -> None:
+def test_what_is_listed_says_things_without_names_of_the_code(pages, what, pattern):
     file = re.compile(r".*\.(?:png|tif|bmp|np[yz]|mat|jpg|zip|yaml)")
     said = {
         f"{page}: {word}"
@@ -133,7 +129,7 @@ def test_what_is_listed_says_things_without_names_of_the_code(pages: dict[str, s
     assert said == set(), what
 
 
-def test_a_value_ends_with_its_own_paragraph(pages: dict[str, str]) -> None:
+def test_a_value_ends_with_its_own_paragraph(pages):
     assert "lpips_alex: no" not in pages["overview"]
     sixteen_bit = pages["folder"].partition("sixteen_bit =")[2]
     assert sixteen_bit.endswith("linear light")  # not the paragraphs that follow it in the docstring
@@ -149,7 +145,6 @@ def test_a_value_ends_with_its_own_paragraph(pages: dict[str, str]) -> None:
         ("?", "unknown kind '?'; allowed: conditions, datasets, methods, metrics, profiles, studies, or a name that"),
     ],
 )
-def test_an_unknown_name_gets_the_nearest(name: str, message: str) -> None:
-    with pytest.raises(UserError) as caught:
+def test_an_unknown_name_gets_the_nearest(name, message):
+    with pytest.raises(UserError, match=f"^{re.escape(message)}"):
         list_(name)
-    assert str(caught.value).startswith(message)

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.study.studies import write_green
+
 CONFIG = """title: no network
-display: {profiles: [leto-mild], panel: [128, 160]}
+display: {profiles: [green.yaml], panel: [128, 160]}
 targets: {dataset: photographs, params: {count: 1}}
 training: {dataset: dead_leaves, params: {count: 3}, held_out: 1}
 methods:
@@ -25,8 +27,9 @@ def _can_be_alone() -> bool:
 
 
 @pytest.mark.skipif(not _can_be_alone(), reason="the system gives no namespace of the network")
-def test_a_study_is_run_and_reported_without_a_network(tmp_path: Path) -> None:
+def test_a_study_is_run_and_reported_without_a_network(tmp_path):
     (tmp_path / "study.yaml").write_text(CONFIG)
+    write_green(tmp_path, "leto-mild")
     command = [str(Path(sys.executable).with_name("holoeval")), "run", "study.yaml", "--workers", "2"]
     done = subprocess.run([*ALONE, *command], cwd=tmp_path, capture_output=True, text=True, env=dict(os.environ))
     assert done.returncode == 0, done.stderr[-2000:]

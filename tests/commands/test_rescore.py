@@ -1,8 +1,6 @@
 """``holoeval rescore`` and ``check`` with a metric that came, or changed, after a study was run."""
 
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -20,25 +18,25 @@ from holobench_eval.study import executors, identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import parted
 from holobench_eval.study.phases import phases_of
-from holobench_eval.study.plan import plan
 from holobench_eval.study.running import provenance
 from holobench_eval.study.store import Store
-from tests.commands import test_moved_session as sessions
+from tests.commands.photographs import test_moved_session as sessions
 from tests.lab.session.running import run, succeed
 from tests.study.running.test_rescore import BOTH, ONE, PICTURE, cells, forget
-from tests.support import another_metric
-from tests.support.another_metric import COLUMN, NAME
-from tests.support.trained_study import compute
+from tests.study.studies import planned
+from tests.support.studies import another_metric
+from tests.support.studies.another_metric import COLUMN, NAME
+from tests.support.studies.trained_study import compute
 
 
 @pytest.fixture(autouse=True)
-def _one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def _one_process(monkeypatch):
     """Others would not know the metric."""
     monkeypatch.setattr(executors, "executor", lambda *_, **__: executors.Serial())
 
 
 @pytest.fixture
-def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+def add(tmp_path, monkeypatch):
     """Puts the metric at a version into the catalogue, and into the columns that reports know."""
 
     def added(version: int) -> None:
@@ -49,7 +47,7 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished(tmp_path_factory):
     """A folder with a study and its report."""
     config = tmp_path_factory.mktemp("finished") / "study.yaml"
     config.write_text(PICTURE)
@@ -59,7 +57,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def report(finished: Path, tmp_path: Path, add: Callable[[int], None]) -> Path:
+def report(finished, tmp_path, add):
     """The folder of a finished study, whose config has named a metric more since."""
     add(1)
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
@@ -67,7 +65,7 @@ def report(finished: Path, tmp_path: Path, add: Callable[[int], None]) -> Path:
     return tmp_path / "out"
 
 
-def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report: Path) -> None:
+def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report):
     config = report.parent / "study.yaml"
     before = pd.read_csv(report / "records.csv")
     said = succeed("rescore", config, "--output", report, "--metric", NAME, "--threads", 1)
@@ -80,11 +78,11 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
     pd.testing.assert_frame_equal(after[list(before)], before)
     assert problems_in(report) == (1, [])
     store = Store(report)  # which has one record and one capture for each cell
-    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in plan(load_study(config)).cells}
+    assert {path.stem for path in store.folder.glob("*.json")} == {cell.id for cell in planned(config).cells}
     assert {path.stem for path in store.folder.glob("*.npy")} == {cell.id for cell in cells(config)}
 
 
-def test_a_plan_says_which_columns_of_what_is_done_are_empty(report: Path) -> None:
+def test_a_plan_says_which_columns_of_what_is_done_are_empty(report):
     config = report.parent / "study.yaml"
     said = succeed("plan", config, "--output", report)
     (line,) = (line for line in said.splitlines() if "lack scores" in line)
@@ -93,7 +91,7 @@ def test_a_plan_says_which_columns_of_what_is_done_are_empty(report: Path) -> No
     assert "lack scores" not in succeed("plan", config, "--output", report)
 
 
-def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> None:
+def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report):
     config = report.parent / "study.yaml"
     forget(config)
     said = succeed("rescore", config, "--output", report)
@@ -102,14 +100,12 @@ def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report: Path) -> No
     assert pd.read_csv(report / "records.csv").filter(like=COLUMN).isna().sum().item() == 2
 
 
-def test_a_metric_that_the_study_does_not_have_is_refused_with_the_nearest(report: Path) -> None:
+def test_a_metric_that_the_study_does_not_have_is_refused_with_the_nearest(report):
     _, failure = run("rescore", report.parent / "study.yaml", "--output", report, "--metric", "psnt")
     assert failure.startswith("--metric psnt: the study has no such metric; did you mean 'psnr'? allowed: match, peak")
 
 
-def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(
-    tmp_path: Path, add: Callable[[int], None]
-) -> None:
+def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(tmp_path, add):
     config = tmp_path / "study.yaml"
     config.write_text(PICTURE)
     _, failure = run("rescore", config, "--output", tmp_path / "never")
@@ -117,22 +113,18 @@ def test_a_study_that_was_never_run_is_told_so_and_nothing_is_solved(
     assert not phases_of(tmp_path / "never").folder.exists()
 
 
-def test_a_metric_more_in_the_package_is_no_problem_of_a_report(
-    tmp_path: Path, add: Callable[[int], None], no_physics: None
-) -> None:
+def test_a_metric_more_in_the_package_is_no_problem_of_a_report(tmp_path, add, no_physics):
     config, folder = tmp_path / "study.yaml", tmp_path / "out"
     config.write_text(PICTURE.replace(f"{ONE}\n", ""))  # scored by every metric that there is
     outcome = compute(config)
     build_report(load_study(config), outcome.records, folder, outcome.provenance)
     assert problems_in(folder) == (1, [])
     add(1)
-    assert NAME in plan(load_study(config)).metrics
+    assert NAME in planned(config).metrics
     assert problems_in(folder) == (1, [])
 
 
-def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_again(
-    report: Path, add: Callable[[int], None]
-) -> None:
+def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_again(report, add):
     config = report.parent / "study.yaml"
     succeed("rescore", config, "--output", report)
     add(2)
@@ -142,9 +134,7 @@ def test_a_report_of_another_version_of_a_metric_is_found_until_it_is_scored_aga
     assert problems_in(report) == (1, [])
 
 
-def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of_a_metric(
-    tmp_path: Path, add: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of_a_metric(tmp_path, add, monkeypatch):
     add(1)
     session = sessions.moved(tmp_path, monkeypatch, sessions.STUDY.replace("[psnr]", f"[psnr, {NAME}]"))
     succeed("session", "import", session)
@@ -167,9 +157,7 @@ def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of
         assert table.filter(like=COLUMN).loc["double_phase"].notna().item() == is_kept
 
 
-def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_scored(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_scored(tmp_path, monkeypatch):
     config, folder = tmp_path / "study.yaml", tmp_path / "out"
     config.write_text(PICTURE)
     with monkeypatch.context() as earlier:

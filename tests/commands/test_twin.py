@@ -1,7 +1,5 @@
 """One command makes a twin of a display, and says how far it can stand for that."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path
@@ -9,7 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from holobench_eval.commands import main
 from holobench_eval.commands.twin import twin
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
@@ -25,7 +22,7 @@ PANEL = (128, 128)
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> Path:
+def quick(monkeypatch, tmp_path, in_process):
     """A folder where twins learn next to nothing, at once."""
     whole = twins.study_text
 
@@ -48,9 +45,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, in_process: None) -> 
 
 
 @pytest.mark.slow
-def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
-    quick: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(quick, capsys):
     display = str(write_green(quick, "leto-aged"))
     twin(display, Path("lab"), panel=PANEL, pictures=3)
     profile = load_profile("lab/lab.yaml")
@@ -93,13 +88,7 @@ def test_a_display_becomes_a_profile_that_says_how_far_it_can_be_trusted(
         (["ideal", "-o", "lab", "--network", "nothing"], "'nothing' cannot be a display; expected a method of this"),
     ],
 )
-def test_what_cannot_be_is_one_line(
-    arguments: list[str],
-    fault: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_cannot_be_is_one_line(arguments, fault, tmp_path, monkeypatch, call):
     folder = tmp_path / "mine"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -109,12 +98,8 @@ def test_what_cannot_be_is_one_line(
     Path("mine.yaml").write_text("like: leto-aged\nname: mine\n")
     Path("eye.yaml").write_text("like: leto-2020\nname: eye\neye: {focus: [0.2, 0, 0], known: true}\n")
     Path("bench.yaml").write_text("name: mine\nslm: {}\n")
-    monkeypatch.setattr("sys.argv", ["holoeval", "twin", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    printed = capsys.readouterr().err
-    assert ended.value.code == 2
-    assert printed.count("\n") == 1
+    code, _, printed = call("twin", *arguments)
+    assert (code, printed.count("\n")) == (2, 1)
     assert fault in printed
     assert not list(folder.rglob("photographs.yaml"))  # so that the next call is not refused
     assert Path("mine.yaml").read_text() == "like: leto-aged\nname: mine\n"
@@ -131,7 +116,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize(("text", "is_bench"), KINDS.items())
-def test_the_file_of_a_bench_is_told_from_a_profile(text: str, is_bench: bool, tmp_path: Path) -> None:
+def test_the_file_of_a_bench_is_told_from_a_profile(text, is_bench, tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     assert twins.is_bench(path) == is_bench
@@ -139,7 +124,7 @@ def test_the_file_of_a_bench_is_told_from_a_profile(text: str, is_bench: bool, t
 
 
 @pytest.mark.slow
-def test_a_trained_method_becomes_a_display_that_a_study_runs_on(quick: Path) -> None:
+def test_a_trained_method_becomes_a_display_that_a_study_runs_on(quick):
     twin(str(write_green(quick, "leto-aged")), Path("net"), panel=PANEL, pictures=3, network="parametric_model")
     profile = load_profile("net/net.yaml")
     assert (profile.network.method, profile.twin.of, profile.twin.pictures) == ("parametric_model", "green", 3)

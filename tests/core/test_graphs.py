@@ -9,7 +9,7 @@ from torch import Tensor
 
 from holobench_eval.core.device import CPU
 from holobench_eval.core.graphs import WARM_UP, is_recorded, repeated
-from tests.support.replaying import Traffic, fake_device
+from tests.support.benches.replaying import Traffic, fake_device
 
 
 class Count:

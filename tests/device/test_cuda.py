@@ -28,7 +28,7 @@ from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.optics import AngularSpectrum
 from holobench_eval.study import cost
 from holobench_eval.study.opening import open_bench
-from tests.support.replaying import Traffic
+from tests.support.benches.replaying import Traffic
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 

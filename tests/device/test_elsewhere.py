@@ -30,7 +30,7 @@ from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.samples import Sample
 from holobench_eval.methods.losses import LOSSES
 from holobench_eval.methods.wirtinger import Objective, Wirtinger
-from tests.support.replaying import fake_device
+from tests.support.benches.replaying import fake_device
 
 PANEL = (208, 208)  # the least whose region MS-SSIM is defined on
 SMALL = {"levels": 3, "width": 4}

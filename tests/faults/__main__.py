@@ -1,7 +1,5 @@
 """Run the campaigns of faults and write ``reports/faults/report.md``: ``python -m tests.faults --hours 0.25``."""
 
-from __future__ import annotations
-
 import argparse
 import random
 import shutil

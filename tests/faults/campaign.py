@@ -4,8 +4,6 @@ A study is planned, trained, solved, scored, written and reported by a process o
 Some studies run on the simulated display, some on a panel and a camera.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """What a virtual camera counts by itself, and what is reported: for each target, and for the training."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence
@@ -11,7 +9,7 @@ from holobench_eval.study.artifacts import progress, provenance_of
 
 COUNTS = Path("counts")  # files with a line for each capture, written as the camera is asked
 TRAINING = "training"
-CAMERA = "Mine"  # the method that has one
+CAMERA = "mine"  # the method that has one
 
 
 def note(names: Sequence[object]) -> str:

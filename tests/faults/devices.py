@@ -1,15 +1,14 @@
 """A panel and a camera that fail at a drawn moment: frames do not come, are old or too small, devices vanish."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from holobench_eval.imaging.convention import Levels
 from holobench_eval.lab.devices import Counts, DeviceError
+from tests.study.studies import exchanged
 from tests.support.simulated_devices import BENCH, Scene, SimulatedCamera, SimulatedSlm, bench, connect
 
-FRAMES = 130  # that the camera takes in a life without a fault, about
+FRAMES = 50  # that the camera takes in a life without a fault, about
 FOREVER = 10**9
 
 STUDY = """title: faults of devices
@@ -19,10 +18,16 @@ protocol: {metrics: [psnr]}
 methods:
   - double_phase
   - {name: wirtinger, params: {iterations: 5}}
-  - {name: "mine.py:Mine", captures: 3}
+  - {name: "mine.py:mine", captures: 3}
 """
-QUICK = BENCH.replace("settle: 0.0", "settle: 0.0, exposure: 0.045")  # else it waits for the panel to find exposures
-FILES = {"study.yaml": STUDY, "bench.yaml": QUICK, "switch.py": "def switch(channel):\n    pass\n"}
+QUICK = exchanged(
+    BENCH,
+    ("settle: 0.0", "settle: 0.0, exposure: 0.045"),  # else it waits for the panel to find exposures
+    ("[6.36e-7, 5.17e-7, 4.46e-7]", "[5.17e-7]"),
+)
+GREEN = "like: leto-mild\nname: green\npanel: {wavelengths: [5.17e-7]}\n"  # faults meet each colour alike
+FILES = {"study.yaml": STUDY, "bench.yaml": QUICK, "green.yaml": GREEN}
+FILES["switch.py"] = "def switch(channel):\n    pass\n"
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ class FailingSlm(SimulatedSlm):
 
 def failing(fault: Fault | None) -> None:
     """Connect a bench, whose devices have the fault."""
-    scene = Scene(bench())
+    scene = Scene(bench("green.yaml"))
     slm, camera = FailingSlm(scene), FailingCamera(scene)
     if fault:
         slm.fault = camera.fault = fault

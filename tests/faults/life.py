@@ -1,7 +1,5 @@
 """One life of a small study, in a process of its own that a fault may end."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -36,6 +34,7 @@ from holobench_eval.study.running import run as running
 from holobench_eval.study.running.progress import Lines
 from tests.faults import devices
 from tests.faults.counts import note, taken
+from tests.support import plugins
 
 LONGEST = 300.0  # seconds that a life may take before it counts as hung
 WORKERS = 2
@@ -45,30 +44,7 @@ PLANNED = Path("planned")  # what the camera does at which capture, see `_counte
 TARGETS = ("astronaut", "coffee")
 STEP, CAPTURES = running.step, {camera: camera.capture for camera in (BenchSession, RealSession)}
 
-METHOD = """
-import os
-from dataclasses import dataclass
-from typing import ClassVar
-
-import torch
-
-
-@dataclass(frozen=True)
-class Mine:
-    camera: ClassVar[bool] = True
-
-    def solve(self, target, bench):
-        phase = torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
-        for _ in range(3):
-            capture = bench.capture(phase[0])
-            if capture.frame.isnan().any():
-                raise ValueError("a frame of nothing")
-            if capture.frame.isinf().any():
-                os.kill(os.getpid(), 9)
-            phase = phase + bench.rectify(capture).mean()
-        return phase
-"""
-
+METHOD = plugins.text("hit")
 STUDY = f"""title: faults
 display: {{profiles: [green.yaml], panel: [128, 160]}}
 targets: {{dataset: photographs, params: {{names: [{", ".join(TARGETS)}]}}}}
@@ -78,7 +54,7 @@ limits: {{seconds: 20}}
 methods:
   - double_phase
   - {{name: wirtinger, params: {{iterations: 5}}}}
-  - {{name: "mine.py:Mine", captures: 3}}
+  - {{name: "mine.py:mine", captures: 3}}
   - name: parametric_model
     params:
       patterns: 4
@@ -87,9 +63,7 @@ methods:
       retrieval: {{iterations: 3}}
 """
 
-GREEN = "like: leto-mild\nname: green\npanel: {wavelengths: [5.17e-7]}\n"  # faults meet each colour alike
-
-SIMULATED = {"mine.py": METHOD, "green.yaml": GREEN, "study.yaml": STUDY}
+SIMULATED = {"mine.py": METHOD, "green.yaml": devices.GREEN, "study.yaml": STUDY}
 PHOTOGRAPHING = SIMULATED | {"study.yaml": re.sub(r"  - double_phase\n.*wirtinger.*\n", "", STUDY)}
 DEVICES = {"mine.py": METHOD, **devices.FILES}
 

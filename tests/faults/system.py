@@ -4,8 +4,6 @@ A fault is a generator: it gives the life that it is about to hit, then hits it,
 going on.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,14 +1,12 @@
 """A study that is hit by faults becomes what it is without one; ``python -m tests.faults`` does the same for long."""
 
-from __future__ import annotations
-
 import os
 import random
 from pathlib import Path
 
 import pytest
 
-from tests.faults.campaign import KINDS, Count, Kind, study, without_fault
+from tests.faults.campaign import KINDS, Count, study, without_fault
 
 ELSEWHERE = {  # what goes the way of a fault that is tried here, or is shown by a test of its own
     "the run is told to end",
@@ -26,7 +24,7 @@ ELSEWHERE = {  # what goes the way of a fault that is tried here, or is shown by
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are found in /proc")
 @pytest.mark.parametrize("kind", KINDS, ids=["simulated", "devices", "captures"])
-def test_a_study_that_is_hit_by_faults_ends_as_one_without(tmp_path: Path, kind: Kind) -> None:
+def test_a_study_that_is_hit_by_faults_ends_as_one_without(tmp_path, kind):
     names = [name for name in kind.faults if name not in ELSEWHERE]
     names = [name for name in names if name != "the disk is full" or os.geteuid() == 0]
     seen = Count()

@@ -4,8 +4,6 @@ Each target runs in a process of its own, guided by the coverage of the package,
 seconds an input. A table goes to ``reports/fuzz/report.md``; an input that breaks a target is kept beside it.
 """
 
-from __future__ import annotations
-
 import argparse
 import platform
 import re

@@ -1,7 +1,5 @@
 """What reads bytes from outside, each with inputs to begin with; bad input is a `UserError` or a `CellError`."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

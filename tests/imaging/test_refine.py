@@ -11,7 +11,7 @@ from skimage import data
 from torch import Tensor
 
 from holobench_eval.imaging import refine
-from tests.support.simulated_grid import random
+from tests.support.benches.simulated_grid import random
 
 SIDE = 160
 

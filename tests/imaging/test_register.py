@@ -6,7 +6,7 @@ from skimage import data
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging import FiducialGrid, Registration, fiducial, register
-from tests.support.simulated_grid import Pose, capture, pose, random
+from tests.support.benches.simulated_grid import Pose, capture, pose, random
 
 SHAPE = (160, 160)
 SENSOR = (360, 360)

@@ -22,7 +22,7 @@ from holobench_eval.methods.multi_plane import MultiPlane
 from holobench_eval.methods.sgd import AmplitudeSGD
 from holobench_eval.methods.simulated.oracle import Oracle
 from holobench_eval.methods.wirtinger import Wirtinger
-from tests.support.replaying import fake_device
+from tests.support.benches.replaying import fake_device
 
 ITERATIONS = 14
 REPLAYS = ITERATIONS - WARM_UP - 1

@@ -1,21 +1,20 @@
 """Small studies for tests: a config in a few words, and texts with pieces exchanged."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import CellError, UserError
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.plan import Plan, Task, plan
 from holobench_eval.study.running.progress import Lines
 from holobench_eval.study.running.run import Outcome, run
-from tests.support.fake_study import install
+from tests.support.studies.fake_study import install
 
 MILD, TWO = "{profiles: [leto-mild], panel: [128, 160]}", "{dataset: photographs, params: {count: 2}}"
 
@@ -41,6 +40,15 @@ def write_green(folder: Path, like: str) -> Path:
     return path
 
 
+def write_ideal_green(folder: Path, name: str, effect: str = "") -> None:
+    """The file of a display of one laser that is ideal but for an effect, as YAML says it."""
+    panel = (
+        "shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.17e-7], distance: 0.02, bits: 8, pupil: 0.8, region: 0.8125"
+    )
+    head = f"name: {name}\nversion: 1\nseed: 0\ndescription: Ideal but for an effect.\n"
+    (folder / f"{name}.yaml").write_text(f"{head}panel: {{{panel}}}\n{effect}\n")
+
+
 def exchanged(text: str, *changes: tuple[str, str]) -> str:
     """A text with pieces exchanged, each of which it has."""
     for old, new in changes:
@@ -49,18 +57,31 @@ def exchanged(text: str, *changes: tuple[str, str]) -> str:
     return text
 
 
+@contextmanager
+def one_line(*words: str) -> Iterator[None]:
+    """What comes is refused in one line that holds the words."""
+    with pytest.raises((UserError, CellError)) as refused:
+        yield
+    line = str(refused.value)
+    assert [word for word in words if word not in line] == [], line
+    assert "\n" not in line
+
+
 def assert_refused(config: Path, message: str) -> None:
     """A config is refused in one line that begins with its place, as the message does, and the reason."""
-    with pytest.raises(UserError) as refused:
+    with one_line(f"{config}:{message}"):
         load_study(config)
-    assert str(refused.value).startswith(f"{config}:{message}")
-    assert "\n" not in str(refused.value)
+
+
+def planned(config: Path) -> Plan:
+    """What a config plans."""
+    return plan(load_study(config))
 
 
 def tasks_of(config: Path) -> dict[str, list[Task]]:
     """The tasks of every method of a study, by its label."""
     tasks: dict[str, list[Task]] = {}
-    for task in plan(load_study(config)).tasks:
+    for task in planned(config).tasks:
         tasks.setdefault(task.label, []).append(task)
     return tasks
 
@@ -97,8 +118,9 @@ def compute(
     write: Callable[[str], None] = lambda line: None,
     executor: Executor | None = None,
     grid: Plan | None = None,
+    artifacts: Path | None = None,
     **options: Any,
 ) -> Outcome:
-    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder."""
-    study, artifacts = load_study(config), output.parent / "artifacts"
-    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, artifacts, **options)
+    """Run a study, or a plan of it that was made before; what is trained lies beside the output folder unless said."""
+    study, trained = load_study(config), artifacts or output.parent / "artifacts"
+    return run(study, grid or plan(study), output, executor or Serial(), Lines(write), 1, trained, **options)

@@ -1,7 +1,5 @@
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
+from unittest.mock import MagicMock, PropertyMock
 
 import pytest
 
@@ -13,25 +11,19 @@ from holobench_eval.study.definition import Study
 from holobench_eval.study.displays import condition
 from holobench_eval.study.opening import open_display
 from holobench_eval.study.plan import Task, plan
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
 
 TEXT = Path(display.__file__).parent.joinpath("simulated", "profiles", "ideal.yaml").read_text()
 
 
-class Uncalibrated:
-    @property
-    def registration(self) -> Any:
-        raise CellError("no circles found")
-
-
-def test_a_condition_tells_a_profile_at_the_panel_of_the_study(tmp_path: Path) -> None:
+def test_a_condition_tells_a_profile_at_the_panel_of_the_study(tmp_path):
     (tmp_path / "mine.yaml").write_text(TEXT.replace("name: ideal", "name: mine"))
     shown = condition("mine.yaml", (128, 256), tmp_path)
     assert (shown.name, shown.version, shown.spec.shape) == ("mine", 1, (128, 256))
     assert condition("mine.yaml", None, tmp_path).spec.shape == (1080, 1920)
 
 
-def test_a_profile_that_changes_under_a_run_is_refused(tmp_path: Path) -> None:
+def test_a_profile_that_changes_under_a_run_is_refused(tmp_path):
     (tmp_path / "mine.yaml").write_text(TEXT)
     shown = condition("mine.yaml", (128, 128), tmp_path)
     (tmp_path / "mine.yaml").write_text(f"{TEXT}# later\n")
@@ -39,19 +31,15 @@ def test_a_profile_that_changes_under_a_run_is_refused(tmp_path: Path) -> None:
         open_display(shown, seed=0)
 
 
-def test_a_failed_calibration_is_found_out_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_calibration_is_found_out_once(tmp_path, monkeypatch):
     (tmp_path / "mine.yaml").write_text(TEXT)
-    shown, opened = condition("mine.yaml", (128, 128), tmp_path), []
-
-    def open_bench(*_: Any, **__: Any) -> Uncalibrated:
-        opened.append(1)
-        return Uncalibrated()
-
-    monkeypatch.setattr(opening, "open_bench", open_bench)
+    shown, bench = condition("mine.yaml", (128, 128), tmp_path), MagicMock()
+    type(bench.return_value).registration = PropertyMock(side_effect=CellError("no circles found"))
+    monkeypatch.setattr(opening, "open_bench", bench)
     for _ in range(2):
         with pytest.raises(CellError, match="no circles found"):
             open_display(shown, seed=0)
-    assert len(opened) == 1
+    bench.assert_called_once()
 
 
 SWEEPS = """sweeps:
@@ -70,7 +58,7 @@ def solutions(study: Study) -> list[Task]:
     return [task for task in plan(study).tasks if not task.is_floor]
 
 
-def test_a_blind_method_is_solved_once_for_changes_it_does_not_know_and_a_seeing_one_under_each(tmp_path: Path) -> None:
+def test_a_blind_method_is_solved_once_for_changes_it_does_not_know_and_a_seeing_one_under_each(tmp_path):
     tasks = solutions(study_with(tmp_path, SWEEPS))
     conditions = [[cell.condition for cell in task.cells] for task in tasks]
     assert conditions == [["ideal", "ideal, drift 30 days"], ["ideal, known eye -2"]]
@@ -79,13 +67,13 @@ def test_a_blind_method_is_solved_once_for_changes_it_does_not_know_and_a_seeing
         assert [len(task.cells) for task in solutions(study_with(tmp_path, SWEEPS, method))] == [1, 1, 1]
 
 
-def test_a_trained_method_is_trained_once_before_any_change(tmp_path: Path) -> None:
+def test_a_trained_method_is_trained_once_before_any_change(tmp_path):
     grid = plan(study_with(tmp_path, SWEEPS, "parametric_model"))
     assert len(grid.preparations()) == 1
     assert {task.preparation.display.change for task in grid.tasks if task.preparation} == {None}
 
 
-def test_the_nominal_value_is_the_unchanged_cell_and_any_other_value_another(tmp_path: Path) -> None:
+def test_the_nominal_value_is_the_unchanged_cell_and_any_other_value_another(tmp_path):
     plain, swept, other = (plan(study_with(tmp_path, text)) for text in ("", SWEEPS, SWEEPS.replace("30", "31")))
     assert {cell.id for cell in plain.cells} <= {cell.id for cell in swept.cells}
     assert len({cell.id for cell in swept.cells} ^ {cell.id for cell in other.cells}) == 2
@@ -95,7 +83,7 @@ def test_the_nominal_value_is_the_unchanged_cell_and_any_other_value_another(tmp
     assert not any("change" in cell.description().get("display", {}) for cell in plain.cells)
 
 
-def test_a_count_of_siblings_is_a_list_of_names(tmp_path: Path) -> None:
+def test_a_count_of_siblings_is_a_list_of_names(tmp_path):
     study = study_with(tmp_path, "sweeps: [{condition: sibling, count: 3}]\n")
     assert study.sweeps[0].values == ("1", "2", "3")
 
@@ -112,13 +100,13 @@ def test_a_count_of_siblings_is_a_list_of_names(tmp_path: Path) -> None:
         ("{condition: drift, values: [1], profiles: [leto]}", "'leto' is not in display.profiles"),
     ],
 )
-def test_a_sweep_that_means_nothing_is_one_line_with_its_place(tmp_path: Path, sweep: str, message: str) -> None:
+def test_a_sweep_that_means_nothing_is_one_line_with_its_place(tmp_path, sweep, message):
     with pytest.raises(UserError, match=r"study.yaml:\d+:\d+: ") as refused:
         study_with(tmp_path, f"sweeps:\n  - {sweep}\n")
     assert message in str(refused.value)
 
 
-def test_a_display_is_opened_once_for_every_change(tmp_path: Path) -> None:
+def test_a_display_is_opened_once_for_every_change(tmp_path):
     place = condition("ideal", (128, 128), tmp_path)
     grid = plan(study_with(tmp_path, SWEEPS))
     shown = {place.title: place for task in grid.tasks for place in task.conditions}

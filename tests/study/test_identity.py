@@ -1,7 +1,5 @@
 """What is in the name of a phase, of a capture and of a score, and what is not."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Mapping
@@ -22,7 +20,7 @@ from holobench_eval.study.displays import Preparation
 from holobench_eval.study.plan import Cell, Plan, plan
 from holobench_eval.study.versions import GIVEN, GIVEN_GRAY
 from tests.study.studies import exchanged, write_ideal
-from tests.support import another_metric, fake_trained
+from tests.support.studies import another_metric, fake_trained
 
 CONFIG = """\
 title: "Names"
@@ -72,9 +70,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_what_a_method_is_given_names_its_phase_and_how_it_is_photographed_its_capture_and_nothing_else_either(
-    tmp_path: Path, change: tuple[str, str, str]
-) -> None:
+def test_what_a_method_is_given_names_its_phase_and_what_is_photographed_its_capture(tmp_path, change):
     names, *pieces = change
     for method in METHODS if names == "capture" else (BLIND,):
         before, after = grid(tmp_path, method), grid(tmp_path, method, (pieces[0], pieces[1]))
@@ -85,12 +81,7 @@ def test_what_a_method_is_given_names_its_phase_and_how_it_is_photographed_its_c
             assert {cell.phase_id for cell in before.cells} <= {cell.phase_id for cell in after.cells}
 
 
-def test_every_repeat_has_a_phase_of_its_own(tmp_path: Path) -> None:
-    repeats = [cell for cell in grid(tmp_path, BLIND, ("seed: 3", "seed: 3\nrepeats: 3")).cells if cell.code]
-    assert len({cell.phase_id for cell in repeats}) == len(repeats) == 2 * 3
-
-
-def test_another_version_or_method_makes_another_phase(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version_or_method_makes_another_phase(tmp_path, monkeypatch):
     kinds = ("double_phase", "double_phase_aa", "double_phase_bl")
     assert len({first(grid(tmp_path, kind)).phase_id for kind in kinds}) == 3
     before = first(grid(tmp_path))
@@ -102,14 +93,14 @@ def test_another_version_or_method_makes_another_phase(tmp_path: Path, monkeypat
 
 
 @pytest.mark.parametrize("optics", [("distance: 0.1 ", "distance: 0.2 "), ("pitch: 6.4e-6", "pitch: 8.0e-6")])
-def test_other_nominal_optics_make_another_phase(tmp_path: Path, optics: tuple[str, str]) -> None:
+def test_other_nominal_optics_make_another_phase(tmp_path, optics):
     before = first(grid(tmp_path))
     write_ideal(tmp_path / "mine.yaml", optics)
     assert first(grid(tmp_path)).phase_id != before.phase_id
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_another_display_of_the_same_optics_makes_another_phase_where_it_is_seen(tmp_path: Path, method: str) -> None:
+def test_another_display_of_the_same_optics_makes_another_phase_where_it_is_seen(tmp_path, method):
     before = first(grid(tmp_path, method))
     for change in (("name: ideal", "name: another"), ("version: 1", "version: 2")):
         write_ideal(tmp_path / "mine.yaml", change)
@@ -119,9 +110,7 @@ def test_another_display_of_the_same_optics_makes_another_phase_where_it_is_seen
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_new_bench_takes_all_captures_again_and_solves_again_what_captured_on_it(
-    tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_new_bench_takes_all_captures_again_and_solves_again_what_captured_on_it(tmp_path, method, monkeypatch):
     before = grid(tmp_path, method)
     monkeypatch.setattr(identity, "PHOTOGRAPHS", "another")  # which are no matter to simulated displays
     assert [cell.id for cell in grid(tmp_path, method).cells] == [cell.id for cell in before.cells]
@@ -132,7 +121,7 @@ def test_a_new_bench_takes_all_captures_again_and_solves_again_what_captured_on_
     assert first(before).prepared == first(after).prepared
 
 
-def test_another_training_makes_another_phase_of_what_learns_and_no_other(tmp_path: Path) -> None:
+def test_another_training_makes_another_phase_of_what_learns_and_no_other(tmp_path):
     change = ("held_out: 1", "held_out: 2")
     for method in (BLIND, TRAINED):
         same = first(grid(tmp_path, method)).phase_id == first(grid(tmp_path, method, change)).phase_id
@@ -145,7 +134,7 @@ def described(**changes: Any) -> Mapping[str, Any]:
     return identity.phase(**(given | {"draw": (1, "a", 0)} | changes))
 
 
-def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase() -> None:
+def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_phase():
     plain = described()
     assert described(files={}, learned="", planes=[], display={}, captures=None, predicts=None) == plain
     assert described(files={"phases.npy": "1"}) != described(files={"phases.npy": "2"}) != plain
@@ -155,9 +144,7 @@ def test_files_that_a_method_reads_and_what_it_learned_are_in_the_name_of_its_ph
 
 
 @pytest.mark.parametrize("measure", ["picture", "prediction", "focus"])
-def test_a_metric_more_or_of_another_version_is_in_no_name_and_in_the_scores_of_the_plan(
-    tmp_path: Path, measure: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_metric_is_in_no_name_and_in_the_scores_of_the_plan(tmp_path, measure, monkeypatch):
     changes = {
         "picture": [("label: row", "label: row")],
         "prediction": [("seed: 3", "seed: 3\nmeasure: prediction"), ("wirtinger", "image_terms")],
@@ -175,7 +162,7 @@ def test_a_metric_more_or_of_another_version_is_in_no_name_and_in_the_scores_of_
         assert [cell.phase_id for cell in after.cells] == [cell.phase_id for cell in before.cells]
 
 
-def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metric_by_the_match() -> None:
+def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metric_by_the_match():
     given = {
         "psnr": {"psnr_linear": 1.0, "psnr_linear_blur0.5": 2.0},
         "ssim": {"ssim_srgb": 3.0},
@@ -199,7 +186,7 @@ def test_scores_are_grouped_by_the_metric_that_gives_them_and_columns_of_no_metr
     assert identity.lacking(nothing, {"speckle_contrast": known["speckle_contrast"]}) == {}  # it found none to measure
 
 
-def test_a_display_of_one_wavelength_has_its_own_version_of_what_a_method_is_given() -> None:
+def test_a_display_of_one_wavelength_has_its_own_version_of_what_a_method_is_given():
     spec = load_profile("ideal").spec((128, 128))
     gray = replace(spec, wavelengths=spec.wavelengths[1:2])
     given = [identity.basis({}, each, ())["given"] for each in (spec, gray)]
@@ -221,7 +208,7 @@ def artifact_id(folder: Path, *changes: tuple[str, str]) -> str:
     return needed.id
 
 
-def test_what_a_state_depends_on_makes_another_artifact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_state_depends_on_makes_another_artifact(tmp_path, monkeypatch):
     changes = [
         ("seed: 3", "seed: 4"),
         ("panel: [128, 128]", "panel: [128, 192]"),
@@ -259,16 +246,11 @@ def test_what_a_state_depends_on_makes_another_artifact(tmp_path: Path, monkeypa
         (ROW, f"{ROW}\n  - wirtinger"),
     ],
 )
-def test_nothing_else_does(tmp_path: Path, change: tuple[str, str]) -> None:
+def test_nothing_else_does(tmp_path, change):
     assert artifact_id(tmp_path, change) == artifact_id(tmp_path)
 
 
-def test_the_version_of_a_shipped_method_is_told(tmp_path: Path) -> None:
-    (needed,) = needs(tmp_path)
-    assert needed.description()["version"] == f"ParametricModel {ParametricModel.version}"
-
-
-def test_every_display_is_learned_for_itself_and_once(tmp_path: Path) -> None:
+def test_every_display_is_learned_for_itself_and_once(tmp_path):
     planned = grid(tmp_path, LEARNS, ("[mine.yaml]", "[ideal, leto-mild]"))
     assert sorted(needed.display.name for needed in planned.preparations().values()) == ["ideal", "leto-mild"]
     for task in planned.tasks:
@@ -278,22 +260,21 @@ def test_every_display_is_learned_for_itself_and_once(tmp_path: Path) -> None:
             assert task.preparation.display.name == task.conditions[0].name
 
 
-def test_a_method_that_learns_nothing_needs_nothing(tmp_path: Path) -> None:
-    assert not grid(tmp_path, BLIND).preparations()
-
-
-def test_a_description_is_plain_and_names_a_folder_inside_that_of_the_artifacts(tmp_path: Path) -> None:
+def test_a_description_is_plain_has_the_version_and_names_a_folder_inside_that_of_the_artifacts(tmp_path):
     write_ideal(tmp_path / "mine.yaml", ("name: ideal", 'name: "../../up"'))
     (needed,) = needs(tmp_path)
     assert json.loads(json.dumps(needed.description())) == needed.description()
+    assert needed.description()["version"] == f"ParametricModel {ParametricModel.version}"
     assert Artifacts(tmp_path / "artifacts").folder_of(needed).parent == tmp_path / "artifacts"
 
 
-def test_images_that_nobody_trains_on_may_be_scored(tmp_path: Path) -> None:
+def test_images_that_nobody_trains_on_may_be_scored(tmp_path):
     targets = "charts, params: {names: [tv_lines, gray_ramp]}"
-    assert grid(tmp_path, BLIND, ("dead_leaves, params: {count: 3}", targets)).cells
+    planned = grid(tmp_path, BLIND, ("dead_leaves, params: {count: 3}", targets))
+    assert planned.cells
+    assert not planned.preparations()
 
 
-def test_held_out_images_leave_some_to_train_on(tmp_path: Path) -> None:
+def test_held_out_images_leave_some_to_train_on(tmp_path):
     with pytest.raises(UserError, match=r"study\.yaml:5:\d+: training\.held_out 3 leaves nothing of 3 images"):
         grid(tmp_path, LEARNS, ("held_out: 1", "held_out: 3"))

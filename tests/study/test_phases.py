@@ -1,7 +1,5 @@
 """Phases are solved once, for all displays, runs and studies that cannot be told apart by what a method is given."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,17 +8,17 @@ import pytest
 import torch
 
 from holobench_eval.methods.double_phase import DoublePhase
-from holobench_eval.study.config import load_study
 from holobench_eval.study.cost import Cost
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.phases import RESULTS, Phases, Solution, phases_of
-from holobench_eval.study.plan import plan
+from holobench_eval.study.plan import FLOORS, REFERENCE
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.study.studies import TURNS, compute, exchanged, write_ideal
-from tests.support import trained_study
-from tests.support.fake_study import solves, untimed, write_config
+from tests.study.studies import TURNS, add_one_laser, add_other_profile, compute, exchanged, planned, write_ideal
+from tests.support.studies import trained_study
+from tests.support.studies.fake_study import untimed, write_config
 
+pytestmark = pytest.mark.usefixtures("no_physics")
 SOLUTION = Solution(torch.linspace(-4, 4, 24).view(2, 3, 4), 5, Cost(0.25, 3.5), "has used its 5", "abc", False)
 CONFIG = """\
 title: "Once"
@@ -32,7 +30,7 @@ methods: [double_phase]
 
 
 @pytest.fixture
-def found(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def found(monkeypatch):
     """Where double phase was solved: the targets, in order."""
     names: list[str] = []
     solve = DoublePhase.solve
@@ -60,16 +58,7 @@ def scores(outcome: Outcome) -> list[dict[str, float]]:
     return [record["scores"] for record in outcome.records]
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_ten_displays_of_the_same_optics_take_one_solution_for_each_target(tmp_path: Path, found: list[str]) -> None:
-    outcome = compute(write_study(tmp_path, 10), tmp_path / "out")
-    assert found == ["tv_lines", "gray_ramp"]
-    assert outcome.solved == 2
-    assert len([record for record in outcome.records if record["label"] == "double_phase"]) == 20
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: Path, found: list[str]) -> None:
+def test_displays_of_the_same_optics_and_studies_beside_share_phases_and_new_repeats_are_solved(tmp_path, found):
     results = tmp_path / RESULTS
     first = compute(write_study(tmp_path), results / "a")
     second = compute(write_study(tmp_path, 3), results / "b", executor=Serial())
@@ -83,27 +72,16 @@ def test_a_study_beside_uses_phases_of_another_and_solves_new_repeats(tmp_path: 
     assert len(found) == 6  # a folder that lies elsewhere shares nothing
 
 
-def test_only_studies_of_a_folder_of_results_share_their_phases() -> None:
+def test_only_studies_of_a_folder_of_results_share_their_phases():
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        write_ideal(tmp_path / f"{name}.yaml", ("name: ideal", f"name: {name}"))
-    config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="one.yaml, two.yaml")
-    assert compute(config, tmp_path / RESULTS / "a").solved == 2
-    assert compute(config, tmp_path / RESULTS / "b").solved == 0
-    assert len(solves(tmp_path)) == 2
-
-
-@pytest.mark.usefixtures("no_physics")
-def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path: Path, found: list[str]) -> None:
+def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path, found):
     config, output = write_study(tmp_path), tmp_path / "out"
     before = scores(compute(config, output))
-    cells = [cell for cell in plan(load_study(config)).cells if cell.code]
+    cells = [cell for cell in planned(config).cells if cell.code]
     lost, damaged = (phases_of(output).path(cell.phase_id) for cell in cells)
     lost.unlink()
     damaged.write_bytes(flipped(damaged.read_bytes()))
@@ -118,7 +96,7 @@ def flipped(content: bytes) -> bytes:
     return content[:middle] + bytes([content[middle] ^ 64]) + content[middle + 1 :]
 
 
-def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
+def test_a_solution_is_read_as_it_was_kept(tmp_path):
     phases = Phases(tmp_path)
     phases.keep("ab", SOLUTION)
     for learned in ("abc", None):
@@ -136,11 +114,10 @@ def test_a_solution_is_read_as_it_was_kept(tmp_path: Path) -> None:
     assert phases.read("cd", None) is None  # of another name
 
 
-def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
+def test_a_damaged_file_is_never_a_phase(tmp_path):
     phases = Phases(tmp_path)
     phases.keep("ab", SOLUTION)
-    file = phases.path("ab")
-    whole = file.read_bytes()
+    file, whole = phases.path("ab"), phases.path("ab").read_bytes()
     for position in range(0, len(whole), 7):
         file.write_bytes(whole[:position])
         assert phases.read("ab", None) is None
@@ -152,8 +129,7 @@ def test_a_damaged_file_is_never_a_phase(tmp_path: Path) -> None:
         assert phases.read("ab", None) is None
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path: Path, found: list[str]) -> None:
+def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tmp_path, found):
     results = tmp_path / RESULTS
     shared = compute(write_study(tmp_path), results / "a", executor=TURNS)
     config = write_study(tmp_path, 1, ("seed: 3", "seed: 3\ntiming: alone"))
@@ -165,12 +141,11 @@ def test_a_time_is_measured_alone_though_the_phase_is_known_from_a_shared_run(tm
     assert len(found) == 3
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and_no_others(tmp_path: Path) -> None:
+def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and_no_others(tmp_path):
     config = trained_study.write(tmp_path, ("methods: [", 'methods: ["trained.py:Even", '))
     first = trained_study.compute(config)
     phases = phases_of(tmp_path / "out")
-    even, gain = (phases.path(cell.phase_id) for cell in plan(load_study(config)).cells if cell.code)
+    even, gain = (phases.path(cell.phase_id) for cell in planned(config).cells if cell.code)
     before = [file.stat().st_mtime_ns for file in (even, gain)]
     again = trained_study.compute(config, retrain=True)
     assert (first.computed, again.computed, again.solved) == (7, 1, 1)
@@ -179,3 +154,58 @@ def test_training_again_makes_the_phases_and_cells_of_what_was_trained_again_and
     after = [file.stat().st_mtime_ns for file in (even, gain)]
     assert after[0] == before[0]
     assert after[1] > before[1]
+
+
+def test_the_grid_is_methods_by_displays_by_targets_by_repeats(tmp_path):
+    add_other_profile(tmp_path)
+    config = write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing"), profiles="ideal, other.yaml")
+    config.write_text(config.read_text() + "repeats: 4\n")
+    cells = planned(config).cells
+    assert len(cells) == 3 * len(FLOORS) + 2 * 2 * 3 * 4
+    assert len({cell.id for cell in cells}) == len(cells)
+
+
+def test_a_method_on_some_displays_has_cells_on_those_only(tmp_path):
+    add_other_profile(tmp_path)
+    entry = '{name: "plugins.py:Toy", profiles: [other.yaml]}'
+    grid = planned(write_config(tmp_path, (entry,), profiles="ideal, other.yaml", count=1))
+    assert [cell.condition for cell in grid.cells] == [REFERENCE] * 5 + ["other"]
+
+
+def test_a_blind_method_is_solved_once_for_displays_of_equal_optics_and_a_seeing_one_on_each(tmp_path):
+    add_other_profile(tmp_path)
+
+    def solved(method: str = "plugins.py:Toy") -> list[int]:
+        tasks = planned(write_config(tmp_path, (method,), profiles="ideal, other.yaml", count=1)).tasks
+        return [len(task.cells) for task in tasks if not task.is_floor]
+
+    assert solved() == [2]
+    assert solved("plugins.py:Seeing") == solved("oracle") == [1, 1]
+    different = (tmp_path / "other.yaml").read_text().replace("distance: 0.1 ", "distance: 0.2 ")
+    (tmp_path / "other.yaml").write_text(different)
+    assert solved() == [1, 1]
+
+
+def test_the_wrong_target_is_the_next_one_and_a_single_target_has_none(tmp_path):
+    wrong = {
+        c.target: c.params["target"] for c in planned(write_config(tmp_path)).cells if c.method == "floor_wrong_target"
+    }
+    assert wrong == {"gray 0": "gray 1", "gray 1": "gray 2", "gray 2": "gray 0"}
+    assert set(FLOORS) - {cell.method for cell in planned(write_config(tmp_path, count=1)).cells} == {
+        "floor_wrong_target"
+    }
+
+
+def test_a_display_with_targets_of_other_colours_has_floors_of_its_own(tmp_path):
+    add_one_laser(tmp_path)
+
+    def floors(profiles: str) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for task in planned(write_config(tmp_path, profiles=profiles)).tasks:
+            for cell in task.cells if task.is_floor else ():
+                found.setdefault(cell.condition, set()).add(cell.id)
+        return found
+
+    colour, gray = floors("ideal, other.yaml"), floors("one.yaml")
+    assert set(colour) == set(gray) == {REFERENCE}
+    assert floors("ideal, other.yaml, one.yaml") == colour | {"reference for one": gray[REFERENCE]}

@@ -1,9 +1,6 @@
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,19 +12,19 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.core.io import file_name, write_atomically
 from holobench_eval.study import identity
 from holobench_eval.study import store as store_module
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.plan import Cell, Plan
 from holobench_eval.study.store import SCHEMA, Record, Store, appears
-from tests.support.fake_study import write_config
+from tests.study.studies import planned
+from tests.support.studies.fake_study import write_config
 
 
 @pytest.fixture(scope="module")
-def grid(tmp_path_factory: pytest.TempPathFactory) -> Plan:
-    return plan(load_study(write_config(tmp_path_factory.mktemp("study"), count=1)))
+def grid(tmp_path_factory):
+    return planned(write_config(tmp_path_factory.mktemp("study"), count=1))
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
+def store(tmp_path):
     return Store(tmp_path / "out")
 
 
@@ -40,12 +37,11 @@ def psnr(value: float, version: str | None = None) -> dict[str, Any]:
     return {"psnr": {"version": version or identity.versions()["psnr"], "values": {"psnr_linear": value}}}
 
 
-def test_a_record_is_read_as_it_was_written_and_an_absent_one_is_none(store: Store, grid: Plan) -> None:
+def test_a_record_is_read_as_it_was_written_and_an_absent_one_is_none(store, grid):
     record = record_of(grid, scores=psnr(20.123456789012345), captures=3, seconds=0.1, saturated=1e-9)
     assert store.read(record.id) is None
     store.write(record)
-    assert store.read(record.id) == record
-    assert record.id == grid.cells[-1].id
+    assert (store.read(record.id), record.id) == (record, grid.cells[-1].id)
 
 
 def edited(content: dict[str, Any], **entries: Any) -> str:
@@ -91,7 +87,7 @@ FAULTS: dict[str, Callable[[str, dict[str, Any]], str]] = {  # of the text and t
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_damaged_record_is_named(store: Store, grid: Plan, fault: str) -> None:
+def test_a_damaged_record_is_named(store, grid, fault):
     record = record_of(grid)
     store.write(record)
     path = store.path(record.id)
@@ -103,13 +99,12 @@ def test_a_damaged_record_is_named(store: Store, grid: Plan, fault: str) -> None
     assert len(str(error.value)) < 400
 
 
-def test_cells_without_a_record_are_missing_and_records_of_other_studies_are_left_alone(
-    store: Store, grid: Plan
-) -> None:
-    store.write(record_of(grid))
+def test_cells_without_a_record_are_missing_records_have_the_name_of_their_plan_and_others_are_left_alone(store, grid):
+    store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
     (store.folder / "foreign.json").write_text("nothing")
-    states = [record["state"] for record in store.load(grid)]
-    assert states == ["missing"] * 5 + ["done"]
+    found = store.load(grid)
+    assert [record["state"] for record in found] == ["missing"] * 5 + ["done"]
+    assert [record["label"] for record in found] == [label for label, _ in grid.labelled()]
 
 
 @pytest.mark.parametrize(
@@ -120,20 +115,20 @@ def test_cells_without_a_record_are_missing_and_records_of_other_studies_are_lef
         ({"scores": psnr(float("inf"))}, "finite numbers"),  # which JSON cannot hold
     ],
 )
-def test_what_could_not_be_read_is_not_written(store: Store, grid: Plan, wrong: dict[str, Any], message: str) -> None:
+def test_what_could_not_be_read_is_not_written(store, grid, wrong, message):
     with pytest.raises(UserError, match=message):
         store.write(record_of(grid, **wrong))
     assert not list(store.folder.glob("*.json"))
 
 
-def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_replaced_leaves_no_rest(tmp_path):
     (tmp_path / "taken").mkdir()
     with pytest.raises(StorageError, match=r"taken cannot be written: .*directory; mend that"):
         write_atomically(tmp_path / "taken", b"x")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
-def test_a_run_makes_its_folder_locks_it_and_removes_the_rests_of_a_killed_run(tmp_path: Path) -> None:
+def test_a_run_makes_its_folder_locks_it_and_removes_the_rests_of_a_killed_run(tmp_path):
     store = Store(tmp_path / "a" / "b")
     with store.locked():
         (store.folder / ".writing-abc").write_text("half")
@@ -145,32 +140,26 @@ def test_a_run_makes_its_folder_locks_it_and_removes_the_rests_of_a_killed_run(t
             pass
 
 
-def test_names_of_files_stay_in_their_folder() -> None:
+def test_names_of_files_stay_in_their_folder():
     assert file_name("astronaut-2.png") == "astronaut-2.png"
     for text in ("../../etc/passwd", "..", ".", "", "/", "a" * 300, "GS (100 steps)"):
         assert re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{1,120}", file_name(text))
 
 
 @given(st.text(max_size=12), st.text(max_size=12))
-def test_different_names_get_different_files(one: str, other: str) -> None:
+def test_different_names_get_different_files(one, other):
     assert (file_name(one) == file_name(other)) == (one == other)
 
 
-def test_a_failure_never_replaces_a_score(store: Store, grid: Plan) -> None:
+def test_a_failure_never_replaces_a_score(store, grid):
     done = record_of(grid, scores=psnr(20.0))
     failed = Record(done.capture, "failed", "Toy", "ZeroDivisionError")
-    store.write(failed)
-    store.write(done)
-    store.write(failed)
+    for record in (failed, done, failed):
+        store.write(record)
     assert store.read(done.id) == done
 
 
-def test_a_record_goes_under_the_name_that_its_plan_gives_to_the_method(store: Store, grid: Plan) -> None:
-    store.write(Record(grid.cells[-1].description(), "done", "a name of an earlier config"))
-    assert [record["label"] for record in store.load(grid)] == [label for label, _ in grid.labelled()]
-
-
-def test_the_state_of_a_cell_is_that_of_its_record_unless_it_is_to_be_timed_or_scored(store: Store, grid: Plan) -> None:
+def test_the_state_of_a_cell_is_that_of_its_record_unless_it_is_to_be_timed_or_scored(store, grid):
     first, second, third, fourth, *rest = grid.cells
     store.write(Record(first.description(), "failed", "Toy", reason="ZeroDivisionError"))
     store.write(Record(second.description(), "done", "Toy", alone=False, scores=psnr(20.0)))
@@ -188,21 +177,21 @@ def test_the_state_of_a_cell_is_that_of_its_record_unless_it_is_to_be_timed_or_s
     assert states(second, metrics=today | {"ssim": "v2, 1"}) == ["failed", "untimed", "skipped", "unscored", *missing]
 
 
-def test_a_score_of_another_version_of_its_metric_is_a_hole(grid: Plan) -> None:
+def test_a_score_of_another_version_of_its_metric_is_a_hole(grid):
     old = psnr(20.0, "v2, 0") | {"ssim": {"version": identity.versions()["ssim"], "values": {"ssim_linear": 0.5}}}
     record = record_of(grid, scores=old, figures={"efficiency": 0.4})
     assert record.values() == {"ssim_linear": 0.5, "efficiency": 0.4}
     assert record.row(grid.cells[-1].facts())["scores"] == record.values()
 
 
-def test_only_named_records_are_removed(store: Store, grid: Plan) -> None:
+def test_only_named_records_are_removed(store, grid):
     for cell in grid.cells:
         store.write(Record(cell.description(), "done", "Toy"))
     store.remove([grid.cells[0].id, "0" * 64])
     assert [name for name, state in store.states(grid.cells).items() if state == "missing"] == [grid.cells[0].id]
 
 
-def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(store: Store, grid: Plan) -> None:
+def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(store, grid):
     store.write(record_of(grid, reason=""))
     room = 1_000_000 - store.path(grid.cells[-1].id).stat().st_size
     largest = record_of(grid, reason="x" * room)
@@ -213,7 +202,7 @@ def test_the_largest_record_that_is_written_can_be_read_and_a_larger_is_refused(
         store.write(record_of(grid, reason="x" * (room + 1)))
 
 
-def test_a_file_is_waited_for_until_it_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_is_waited_for_until_it_is_late(tmp_path, monkeypatch):
     clock, file = iter(range(100)), tmp_path / "file"
     monkeypatch.setattr(store_module.time, "monotonic", lambda: float(next(clock)))
     monkeypatch.setattr(store_module.time, "sleep", lambda seconds: None)

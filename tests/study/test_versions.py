@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Callable
@@ -15,10 +13,10 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from holobench_eval.study.versions import method_version
 from tests.study.studies import compute
-from tests.support.trained_study import needs, write
+from tests.support.studies.trained_study import needs, write
 
 
-def test_the_code_of_an_installed_method_is_all_of_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_code_of_an_installed_method_is_all_of_its_package(tmp_path, monkeypatch):
     files = {"__init__.py", "unused.py", "plug/__init__.py", "plug/method.py", "plug/deep/first.py", "data.txt"}
     for name in files:
         (tmp_path / "a_shop" / name).parent.mkdir(parents=True, exist_ok=True)
@@ -38,46 +36,33 @@ def test_the_code_of_an_installed_method_is_all_of_its_package(tmp_path: Path, m
     assert code().sha256 != before.sha256
 
 
-def test_a_shipped_method_is_named_by_its_declared_version(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shipped_method_is_named_by_its_declared_version(monkeypatch):
     assert method_version(Wirtinger) == "Wirtinger 1"
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
     assert method_version(Wirtinger) == "Wirtinger 2"
 
 
-MINE = """
-from dataclasses import dataclass
-from holobench_eval.methods.wirtinger import Wirtinger
-
-@dataclass(frozen=True)
-class Method(Wirtinger):
-    pass
-"""
+MINE = "from holobench_eval.methods.wirtinger import Wirtinger\n\nclass Method(Wirtinger): ...\n"
 
 
 def version(folder: Path, name: str = "Method") -> str:
     return method_version(plugins.find("methods", f"mine.py:{name}", folder))
 
 
-CALLING = """
-from holobench_eval.methods.wirtinger import Wirtinger
-
-
-def Method(target, bench):
-    return Wirtinger().solve(target, bench)
-"""
+CALLING = MINE.replace(
+    "class Method(Wirtinger): ...", "def Method(target, bench):\n    return Wirtinger().solve(target, bench)"
+)
 
 
 @pytest.mark.parametrize("text", [MINE, CALLING])
-def test_a_users_method_follows_the_version_of_its_base_and_of_what_it_calls(
-    tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_users_method_follows_the_version_of_its_base_and_of_what_it_calls(tmp_path, text, monkeypatch):
     (tmp_path / "mine.py").write_text(text)
     before = version(tmp_path)
     monkeypatch.setattr(Wirtinger, "version", 2, raising=False)
     assert version(tmp_path) != before
 
 
-def test_a_shipped_class_under_the_name_of_a_file_is_that_files(tmp_path: Path) -> None:
+def test_a_shipped_class_under_the_name_of_a_file_is_that_files(tmp_path):
     (tmp_path / "mine.py").write_text(MINE)
     assert len(version(tmp_path, "Wirtinger")) == 64
     assert method_version(Wirtinger) == "Wirtinger 1"
@@ -103,7 +88,7 @@ def edited(text: str) -> str:
 
 
 @pytest.mark.parametrize("isolation", ["files", "none"])
-def test_code_that_was_edited_is_not_trained(tmp_path: Path, isolation: str) -> None:
+def test_code_that_was_edited_is_not_trained(tmp_path, isolation):
     config = write(tmp_path, OTHER, ("seed: 3", f"seed: 3\nisolation: {isolation}"))
     assert reasons(config, edited) == {
         "not trained: the code of other.py:Gain has changed since the study was planned; start the run again"
@@ -124,13 +109,13 @@ AT_WORK = {
 
 
 @pytest.mark.parametrize("changes", AT_WORK.values(), ids=AT_WORK)
-def test_code_that_was_edited_does_nothing(tmp_path: Path, changes: tuple[tuple[str, str], ...]) -> None:
+def test_code_that_was_edited_does_nothing(tmp_path, changes):
     (why,) = reasons(write(tmp_path, *changes), edited)
     assert "the code of other.py:Even has changed since the study was planned" in why
 
 
 @pytest.mark.parametrize("name", ["Even", "Gain"])
-def test_the_code_of_images_that_was_edited_is_refused(tmp_path: Path, name: str) -> None:
+def test_the_code_of_images_that_was_edited_is_refused(tmp_path, name):
     (why,) = reasons(
         write(tmp_path, (METHODS, f'methods: ["other.py:{name}"]')), lambda text: f"{text}\n", "trained.py"
     )
@@ -138,7 +123,7 @@ def test_the_code_of_images_that_was_edited_is_refused(tmp_path: Path, name: str
 
 
 @pytest.mark.parametrize(("file", "outdated"), [("other.py", "other code"), ("trained.py", "other code of its images")])
-def test_a_training_of_before_an_edit_is_not_used_after_it(tmp_path: Path, file: str, outdated: str) -> None:
+def test_a_training_of_before_an_edit_is_not_used_after_it(tmp_path, file, outdated):
     config, artifacts, path = write(tmp_path, OTHER), Artifacts(tmp_path / "artifacts"), tmp_path / file
     (tmp_path / "other.py").write_text((tmp_path / "trained.py").read_text())
     (before,) = needs(config)

@@ -17,21 +17,9 @@ from tests.support import synthetic_study as synthetic
 
 TARGETS = synthetic.TARGETS[:4]
 SCORES = ("psnr_linear", "ssim_linear", "ms_ssim_linear", "efficiency")
-REPORT = """\
-# A title
-
-## Question
-
-Is it <b>better</b>?
-
-## Answer
-
-- [Yes](https://example.org)
-
-## More
-
-No.
-"""
+REPORT = (
+    "# A title\n\n## Question\n\nIs it <b>better</b>?\n\n## Answer\n\n- [Yes](https://example.org)\n\n## More\n\nNo.\n"
+)
 
 
 def provenance(**changes: Any) -> dict[str, Any]:

@@ -1,18 +1,17 @@
 """A finished report, computed once without physics, that tests copy and spoil."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from holobench_eval.report import build_report
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute
-from tests.support.fake_study import installed, write_config
+from tests.support.studies.fake_study import installed, write_config
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished(tmp_path_factory):
     """A folder with a config, and its report in ``reports/study``."""
     folder = tmp_path_factory.mktemp("finished")
     config, report = write_config(folder, count=2), folder / "reports" / "study"
@@ -23,7 +22,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def made(finished: Path, tmp_path: Path) -> Path:
+def made(finished, tmp_path):
     """The report in a copy of that folder."""
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     return tmp_path / "reports" / "study"

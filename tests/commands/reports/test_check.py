@@ -1,6 +1,5 @@
 import json
 import re
-from pathlib import Path
 
 import pytest
 import typer
@@ -11,7 +10,7 @@ from holobench_eval.core.errors import UserError
 DIFFERS = "does not follow from records.csv; run: holoeval report "
 
 
-def test_a_report_that_follows_from_its_records_passes_by_itself_and_in_its_folder(made: Path) -> None:
+def test_a_report_that_follows_from_its_records_passes_by_itself_and_in_its_folder(made):
     assert problems_in(made) == problems_in(made.parent) == (1, [])
 
 
@@ -30,11 +29,10 @@ def test_a_report_that_follows_from_its_records_passes_by_itself_and_in_its_fold
         ("provenance.json", r"(?s)\A.*\Z", "{}", "lacks config, config_sha256, profiles"),
     ],
 )
-def test_what_was_changed_is_the_one_problem(made: Path, name: str, old: str, new: str, message: str) -> None:
-    file = made / name
-    text = re.sub(old, new, file.read_text(), count=1)
-    assert text != file.read_text()
-    file.write_text(text)
+def test_what_was_changed_is_the_one_problem(made, name, old, new, message):
+    file, before = made / name, (made / name).read_text()
+    file.write_text(re.sub(old, new, before, count=1))
+    assert file.read_text() != before
     (problem,) = problems_in(made)[1]
     assert problem.startswith(f"{made}: ")
     assert re.search(message.replace("{", r"\{"), problem)
@@ -42,25 +40,22 @@ def test_what_was_changed_is_the_one_problem(made: Path, name: str, old: str, ne
 
 
 @pytest.mark.parametrize("name", ["report.md", "details.md", "table.csv", "records.csv", "tests.csv"])
-def test_a_missing_file_is_found(made: Path, name: str) -> None:
+def test_a_missing_file_is_found(made, name):
     (made / name).unlink()
     (problem,) = problems_in(made)[1]
-    assert f"{name} " in problem
-    assert "missing" in problem
+    assert re.search(rf"{name} .*missing", problem)
 
 
-def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_reports_is_refused(tmp_path):
     with pytest.raises(UserError, match="no report, and none in its folders"):
         problems_in(tmp_path)
 
 
-def test_scores_by_an_earlier_protocol_are_no_problem_and_said_in_one_line(
-    made: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scores_by_an_earlier_protocol_are_no_problem_and_said_in_one_line(made, capsys):
     file = made / "provenance.json"
-    known = json.loads(file.read_text())
-    known["scores"] = {name: version.replace("v2", "v1") for name, version in known["scores"].items()}
-    file.write_text(json.dumps(known))
+    scores = json.loads(file.read_text())["scores"]
+    earlier = {name: version.replace("v2", "v1") for name, version in scores.items()}
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"scores": earlier}))
     check(made.parent)
     said, counted = capsys.readouterr().out.splitlines()
     assert said.startswith("1 report of scores by metric protocol v1, as their pages say; now it is v2")
@@ -68,9 +63,7 @@ def test_scores_by_an_earlier_protocol_are_no_problem_and_said_in_one_line(
 
 
 @pytest.mark.parametrize("text", ["{", '{"scores": 3}', '{"scores": {"psnr": 1}}'])
-def test_a_provenance_that_is_no_provenance_ends_the_check_with_its_problem_alone(
-    made: Path, text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_provenance_that_is_no_provenance_ends_the_check_with_its_problem_alone(made, text, capsys):
     (made / "provenance.json").write_text(text)
     with pytest.raises(typer.Exit):
         check(made.parent)

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -12,28 +11,28 @@ from holobench_eval.core.errors import UserError
 
 
 @pytest.fixture
-def committed(made: Path) -> tuple[Path, Path]:
+def committed(made):
     """A config, and the committed files of its report."""
     shutil.rmtree(made / "records")
     return made.parents[1] / "study.yaml", made
 
 
-def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_and_nothing_else_changes(
-    committed: tuple[Path, Path],
-) -> None:
+def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_files_alone(committed):
     config, folder = committed
-    before = json.loads((folder / "provenance.json").read_text())
-    records = (folder / "records.csv").read_bytes()
-    tables = (folder / "table.csv").read_bytes()
+
+    def tables() -> list[bytes]:
+        return [(folder / name).read_bytes() for name in ("records.csv", "table.csv")]
+
+    before, known = tables(), json.loads((folder / "provenance.json").read_text())
     config.write_text(f"{config.read_text()}question: What does Toy score?\n")
     assert len(problems_in(folder)[1]) == 1
 
     report(config, folder)
-    assert "What does Toy score?" in (folder / "report.md").read_text()
-    assert "(figures/answer-pictures.jpg)" in (folder / "report.md").read_text()
-    assert ((folder / "records.csv").read_bytes(), (folder / "table.csv").read_bytes()) == (records, tables)
+    text = (folder / "report.md").read_text()
+    assert all(words in text for words in ("What does Toy score?", "(figures/answer-pictures.jpg)"))
+    assert tables() == before
     after = json.loads((folder / "provenance.json").read_text())
-    assert {key for key in before if before[key] != after[key]} == {"config_sha256"}
+    assert {key for key in known if known[key] != after[key]} == {"config_sha256"}
     assert problems_in(folder)[1] == []
 
     config.write_text(config.read_text().replace("- plugins.py:Toy", '- {name: "plugins.py:Toy", label: Anew | <b>}'))
@@ -42,7 +41,7 @@ def test_a_new_question_and_a_new_name_of_a_row_are_written_from_the_committed_f
     assert problems_in(folder)[1] == []
 
 
-def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(committed: tuple[Path, Path]) -> None:
+def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(committed):
     config, folder = committed
     before = (folder / "report.md").read_bytes()
     config.write_text(config.read_text().replace("count: 2", "count: 3"))
@@ -51,9 +50,7 @@ def test_cells_that_the_committed_files_lack_are_computed_and_never_made_up(comm
     assert (folder / "report.md").read_bytes() == before
 
 
-def test_a_report_written_again_from_committed_files_keeps_the_protocol_that_its_scores_are_of(
-    committed: tuple[Path, Path],
-) -> None:
+def test_a_report_written_again_from_committed_files_keeps_the_protocol_that_its_scores_are_of(committed):
     config, folder = committed
     for name in ("provenance.json", "records.csv"):
         file = folder / name

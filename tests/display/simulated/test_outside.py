@@ -5,7 +5,7 @@ import torch
 
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.study.opening import open_bench
-from tests.support import outside
+from tests.support.benches import outside
 
 PANEL = (144, 144)
 

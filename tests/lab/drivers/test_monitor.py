@@ -9,7 +9,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.drivers.monitor import MonitorSettings, MonitorSlm, list_monitors, matching
-from tests.support.two_monitors import PANEL, PANEL_AT, Eyes, two_monitors
+from tests.support.benches.two_monitors import PANEL, PANEL_AT, Eyes, two_monitors
 
 SHAPE = (1080, 1920)
 

@@ -11,8 +11,8 @@ from holobench_eval.report import build_report, committed_records, difference, r
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.studies import compute
-from tests.support.fake_study import write_config
 from tests.support.reports import files
+from tests.support.studies.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 

@@ -7,7 +7,7 @@ from holobench_eval.report import layout_of
 from holobench_eval.report.description import describe
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
-from tests.support.fake_study import PLUGINS
+from tests.support.studies.fake_study import PLUGINS
 
 CONFIG = """
 title: Two methods

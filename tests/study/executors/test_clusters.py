@@ -1,7 +1,5 @@
 """Studies on Dask clusters: a scheduler that runs already, and jobs of a queue that starts them when it likes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import stat
@@ -22,8 +20,9 @@ from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
 from holobench_eval.study.running import run as running
 from tests.study.executors.test_executors import compute, untimed
-from tests.support.fake_study import fake_work, write_config
+from tests.support.studies.fake_study import fake_work, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
 SBATCH = """\
 #!{python}
 import pathlib, subprocess, sys
@@ -44,11 +43,7 @@ for job in sys.argv[1:]:
 """
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
-def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_process_where_the_run_reads(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_of_a_scheduler_elsewhere_give_the_table_of_one_process_where_the_run_reads(tmp_path, monkeypatch):
     from distributed import LocalCluster
 
     config = write_config(tmp_path)
@@ -66,13 +61,12 @@ def test_workers_of_a_scheduler_that_runs_elsewhere_give_the_table_of_one_proces
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
-def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path: Path) -> None:
+def test_a_worker_that_does_not_see_the_folder_says_so(tmp_path):
     with pytest.raises(UserError, match=r"does not see the folder .*gone"):
         clusters._at_home(str(tmp_path / "gone"), resources, 0)
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_records_that_cannot_be_seen_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_records_that_cannot_be_seen_end_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "LATE", 0.0)
 
     class Elsewhere(Serial):
@@ -92,7 +86,7 @@ def until_seen(_: object) -> None:
 
 
 @pytest.mark.parametrize("waiting", [False, True], ids=["with a job", "before its first job"])
-def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest.MonkeyPatch, waiting: bool) -> None:
+def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch, waiting):
     import dask
     from distributed import LocalCluster
 
@@ -117,11 +111,10 @@ def test_a_scheduler_that_goes_away_ends_the_run_in_one_line(monkeypatch: pytest
         SEEN.set()
 
 
-def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
     monkeypatch.setattr("holobench_eval.study.executors.clusters.ANSWER", 1.0)
-    with pytest.raises(UserError, match="no Dask scheduler answers at 'tcp:") as caught:
+    with pytest.raises(UserError, match=r"^no Dask scheduler answers at 'tcp:.*$"):
         _ = Address("tcp://127.0.0.1:9").workers
-    assert "\n" not in str(caught.value)
 
 
 def resources(_: int) -> dict[str, float]:
@@ -131,9 +124,7 @@ def resources(_: int) -> dict[str, float]:
     return dict(get_worker().state.total_resources)
 
 
-@pytest.fixture
-def one_gpu_of_two() -> Iterator[str]:
-    """The address of a scheduler with two workers, one of which declares a GPU."""
+def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one_and_on_the_cpu_to_any():
     from distributed import Client, Scheduler, SpecCluster, Worker
 
     workers: dict[str, dict[str, Any]] = {
@@ -143,23 +134,17 @@ def one_gpu_of_two() -> Iterator[str]:
     scheduler = {"cls": Scheduler, "options": {"dashboard": False, "port": 0}}
     with SpecCluster(workers=workers, scheduler=scheduler, silence_logs=50) as cluster, Client(cluster) as client:
         client.wait_for_workers(2)
-        yield cluster.scheduler_address
+        for on_gpu, count, declared in ((True, 1, {1}), (False, 2, {0, 1})):
+            chosen = Address(cluster.scheduler_address, on_gpu)
+            assert chosen.workers == count
+            assert {found.get("GPU", 0) for _, found in chosen.map(resources, range(6))} == declared
 
 
-@pytest.mark.parametrize(("on_gpu", "workers", "declared"), [(True, 1, {1}), (False, 2, {0, 1})])
-def test_on_a_gpu_every_job_goes_to_a_worker_that_declares_one_and_on_the_cpu_to_any(
-    one_gpu_of_two: str, on_gpu: bool, workers: int, declared: set[int]
-) -> None:
-    chosen = Address(one_gpu_of_two, on_gpu)
-    assert chosen.workers == workers
-    assert {found.get("GPU", 0) for _, found in chosen.map(resources, range(6))} == declared  # type: ignore[union-attr]
-
-
-UNUSABLE = [(2, False, "has several threads"), (1, True, "declares a GPU; start one with: dask worker {address} ")]
-
-
-@pytest.mark.parametrize(("threads", "on_gpu", "message"), UNUSABLE)
-def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads: int, on_gpu: bool, message: str) -> None:
+@pytest.mark.parametrize(
+    ("threads", "on_gpu", "message"),
+    [(2, False, "has several threads"), (1, True, "declares a GPU; start one with: dask worker {address} ")],
+)
+def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads, on_gpu, message):
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=1, threads_per_worker=threads, processes=False, dashboard_address=None) as cluster:
@@ -169,7 +154,7 @@ def test_a_scheduler_without_usable_workers_says_how_to_start_one(threads: int, 
 
 
 @pytest.fixture
-def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def queue(tmp_path, monkeypatch):
     """A SLURM queue that starts every job at once, and the file that it keeps their scripts in."""
     pytest.importorskip("dask_jobqueue")
     import dask
@@ -186,11 +171,8 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield tmp_path / "jobs"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("on_gpu", [False, True])
-def test_jobs_of_a_slurm_queue_run_on_workers_of_one_thread_that_declare_a_gpu_beside_the_sites_own_arguments(
-    queue: Path, on_gpu: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_slurm_jobs_have_one_thread_declare_a_gpu_and_keep_the_sites_own_arguments(queue, on_gpu, monkeypatch):
     import dask
 
     for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:

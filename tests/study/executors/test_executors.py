@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -19,8 +17,10 @@ from holobench_eval.study import executors
 from holobench_eval.study.executors import Executor, Local, Serial, executor, processes
 from holobench_eval.study.running import run as running
 from tests.study import studies
-from tests.support.fake_study import lose_a_worker, noted_work, solves, write_config
 from tests.support.patience import PATIENCE, wait_until
+from tests.support.studies.fake_study import lose_a_worker, noted_work, solves, write_config
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
 
 
 def compute(config: Path, output: Path, chosen: Executor, **options: Any) -> list[dict[str, Any]]:
@@ -31,27 +31,18 @@ def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "alone": None} for record in records]
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
-def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_worker_processes_give_what_one_process_gives_but_for_a_lost_cell(tmp_path, monkeypatch):
     config = write_config(tmp_path)
     serial = compute(config, tmp_path / "serial", Serial())
     monkeypatch.setattr(running, "step", lose_a_worker)
     local = compute(config, tmp_path / "local", Local(2))
-    lost = [record["state"] == "failed" for record in local]
-    assert [record["cell"]["target"] for record, gone in zip(local, lost, strict=True) if gone] == ["gray 1"]
-    assert all(record["reason"].startswith("KilledWorker") for record in local if record["state"] != "done")
-    kept = [record for record, gone in zip(serial, lost, strict=True) if not gone]
-    assert untimed([record for record in local if record["state"] == "done"]) == untimed(kept)
+    (lost,) = (number for number, record in enumerate(local) if record["state"] != "done")
+    gone = local.pop(lost)
+    assert (gone["state"], gone["cell"]["target"], gone["reason"][:12]) == ("failed", "gray 1", "KilledWorker")
+    assert untimed(local) == untimed(serial[:lost] + serial[lost + 1 :])
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_physics")
-def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(tmp_path, monkeypatch):
     methods = tuple(f'{{name: "plugins.py:Toy", label: m{i}, params: {{value: {i}, pause: 0.2}}}}' for i in range(3))
     config = write_config(tmp_path, methods)
     config.write_text(f"{config.read_text()}timing: alone\n")
@@ -67,8 +58,7 @@ def test_one_solution_of_every_row_is_timed_with_nothing_beside_it(
     assert True in overlapping
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path: Path) -> None:
+def test_drawings_are_made_beside_the_cells_and_a_failed_one_costs_nothing(tmp_path):
     class Both(Serial):
         def map(self, function: Any, jobs: Any) -> Any:
             for job in jobs:
@@ -96,10 +86,7 @@ def endless(folder: Path) -> None:
     time.sleep(1000)
 
 
-@pytest.mark.slow
-def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_an_error_is_the_result_of_its_job(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_have_one_thread_a_gpu_each_and_the_folder_of_the_run_and_return_errors(tmp_path, monkeypatch):
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,5")
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.chdir(tmp_path)
@@ -113,9 +100,8 @@ def run_of_two(folder: Path) -> None:
     list(Local(2).map(endless, [folder] * 2))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
-def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> None:
+def test_workers_end_with_their_run(tmp_path, ending):
     def end(run: int) -> None:
         wait_until(lambda: len(list(tmp_path.iterdir())) == 2)
         os.kill(run, ending)
@@ -135,8 +121,7 @@ def test_workers_end_with_their_run(tmp_path: Path, ending: signal.Signals) -> N
     wait_until(lambda: not any(Path("/proc", worker.name).exists() for worker in tmp_path.iterdir()))
 
 
-@pytest.mark.slow
-def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path: Path) -> None:
+def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path):
     (tmp_path / "slow.py").write_text("import time\nopen('importing', 'w').close()\ntime.sleep(1)")
     code = """if True:
         import time
@@ -148,22 +133,15 @@ def test_ctrl_c_while_the_process_of_the_workers_imports_is_quiet(tmp_path: Path
         except KeyboardInterrupt:
             print("seen")
     """
-    run = subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    run = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment, start_new_session=True, **pipes)
     wait_until((tmp_path / "importing").exists)
     os.killpg(run.pid, signal.SIGINT)
     assert run.communicate(timeout=PATIENCE) == ("seen\n", "")
 
 
-@pytest.mark.slow
-def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others() -> None:
+def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_server_to_the_others():
     processes.prepare()
     server: Any = forkserver._forkserver  # type: ignore[attr-defined]
     before = server._forkserver_pid
@@ -175,29 +153,21 @@ def test_a_process_that_is_killed_while_it_asks_for_another_one_leaves_the_serve
         assert (other.exitcode, server._forkserver_pid) == (0, before)
 
 
-NEEDY = [("local", None, False), ("auto", None, True), ("auto", 2, False)]
-OTHERS = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial", None, True), ("slurm", 4, True)]
-
-
-@pytest.mark.parametrize("chosen", [*NEEDY, *OTHERS])
-def test_workers_are_prepared_only_where_they_are_needed(chosen: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[bool] = []
-    monkeypatch.setattr(executors, "prepare", lambda: begun.append(True))
+def test_workers_are_prepared_only_where_they_are_needed(monkeypatch):
+    needy = [("local", None, False), ("auto", None, True), ("auto", 2, False)]
+    others = [("auto", None, False), ("auto", 1, True), ("local", 1, True), ("serial", None, True), ("slurm", 4, True)]
+    begun: list[Any] = []
     monkeypatch.setattr(executors, "_cores", lambda: 2)
-    executors.begin(*chosen)
-    assert bool(begun) == (chosen in NEEDY)
+    for chosen in needy + others:
+        monkeypatch.setattr(executors, "prepare", lambda: begun.append(chosen))  # noqa: B023
+        executors.begin(*chosen)
+    assert begun == needy
 
 
-def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
+def test_the_serial_executor_takes_a_job_when_it_starts_it():
     taken: list[int] = []
-
-    def jobs() -> Any:
-        for number in range(3):
-            taken.append(number)
-            yield number
-
-    results = Serial().map(lambda number: number * 2, jobs())
-    assert next(results) == (0, 0)
+    jobs = (taken.append(number) or number for number in range(3))
+    assert next(Serial().map(lambda number: number * 2, jobs)) == (0, 0)
     assert taken == [0]
 
 
@@ -213,8 +183,6 @@ def test_the_serial_executor_takes_a_job_when_it_starts_it() -> None:
         ("slurm", None, None, "needs --workers"),
     ],
 )
-def test_an_executor_that_cannot_be_is_refused(
-    name: str, workers: int | None, address: str | None, message: str
-) -> None:
+def test_an_executor_that_cannot_be_is_refused(name, workers, address, message):
     with pytest.raises(UserError, match=message):
         executor(name, workers, address=address)

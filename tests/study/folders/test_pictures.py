@@ -5,11 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.lab.dark import given_dark
+from holobench_eval.lab.dark import Dark, given_dark
+from holobench_eval.optics.colour import srgb_decode
+from holobench_eval.study.folders.doubts import LIFTED
+from holobench_eval.study.folders.exposure import darkest
 from holobench_eval.study.folders.files import read_folders
 from holobench_eval.study.folders.pictures import checked
+from tests.study.studies import one_line
 from tests.support.photographed import photograph, save
 
 COLOUR = photograph("coffee", (48, 64))  # (3, h, w)
@@ -67,9 +74,8 @@ def test_floating_point_is_read_over_its_highest_value(tmp_path, form):
 )
 def test_numbers_that_are_no_photograph_are_refused_in_one_line(tmp_path, values, line):
     np.save(tmp_path / "x.npy", values)
-    with pytest.raises(UserError, match=line) as caught:
+    with one_line(line):
         checked(tmp_path / "x.npy")
-    assert "\n" not in str(caught.value)
 
 
 def test_a_target_of_floating_point_is_refused(tmp_path):
@@ -104,3 +110,20 @@ def test_a_camera_of_fewer_bits_clips_at_its_own_last_level(tmp_path, shift, las
     assert (picture.load() >= picture.full).mean() == (counts == last).mean() > 0.05
     interleaved(tmp_path / "y.tif", np.minimum(counts, last // 2))
     assert checked(tmp_path / "y.tif").full == 1 or shift == 0
+
+
+TARGET = srgb_decode(torch.from_numpy(photograph("astronaut", (80, 100)))).double()
+MEAN = float(TARGET.mean())
+
+
+@settings(max_examples=40, deadline=None)
+@given(black=st.floats(0.1, 2.0), gain=st.floats(1e-3, 1e6))
+def test_a_constant_is_seen_at_any_gain_and_not_once_it_is_taken_off(black, gain):
+    """black: of the mean of the light."""
+    counts = gain * (TARGET + black * MEAN)
+    lifted = darkest(counts, TARGET)
+    assert lifted == pytest.approx(darkest(TARGET + black * MEAN, TARGET), rel=1e-6)
+    assert lifted > 0.8 * black * MEAN / (1 + black)
+    light = Dark(np.array(gain * black * MEAN)).off(counts.numpy())
+    assert abs(darkest(torch.from_numpy(light), TARGET)) < 1e-3 < LIFTED
+    assert darkest(TARGET - black * MEAN / 2, TARGET) < 0  # too much was taken off

@@ -1,7 +1,5 @@
 """What a method takes in a process of its own is measured from outside, whatever the process does about it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -11,64 +9,15 @@ import pytest
 
 from holobench_eval.core.device import CPU
 from holobench_eval.study import cost, isolation
+from tests.support import plugins
+from tests.support.plugins.burning import BURNER, MIB
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
 
-MIB = 96
-BURNER = "import time; x = bytearray(b'1') * {mib} * 2**20; print(1, flush=True)\nwhile {more}: pass"
-BURNED = BURNER.format(mib=MIB, more="time.process_time() < 0.3")
-LASTING = f"{BURNED}\nprint(2, flush=True)\nwhile True: pass"
-METHODS = f'''
-import os, subprocess, sys, time
-from dataclasses import dataclass
-
-SECONDS = 0.3
-
-
-def burn():
-    began = time.process_time()
-    while time.process_time() - began < SECONDS:
-        pass
-
-
-@dataclass(frozen=True)
-class Plain:
-    def solve(self, target, bench):
-        return target
-
-
-class SetsPeakBack(Plain):
-    def solve(self, target, bench):
-        held = bytearray(b"1") * {MIB} * 2**20
-        time.sleep(4 * {cost.EACH})
-        del held
-        with open("/proc/self/clear_refs", "w") as file:
-            file.write("5")
-        return target
-
-
-class HasItDone(Plain):
-    """By a process that ends before it does."""
-
-    def solve(self, target, bench):
-        subprocess.run([sys.executable, "-c", {BURNED!r}])
-        return target
-
-
-class LeavesIt(Plain):
-    """To a process of another session, which goes on and on."""
-
-    def solve(self, target, bench):
-        mine = [sys.executable, "-c", {LASTING!r}, os.getcwd()]
-        told = subprocess.Popen(mine, start_new_session=True, stdout=subprocess.PIPE).stdout
-        told.readline(), told.readline()
-        return target
-'''
-
 
 def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
-    """What a class of ``METHODS`` takes in its process; more: code that its file ends with."""
-    (folder / "mine.py").write_text(METHODS + more)
+    """What a class of ``burning`` takes in its process; more: code that its file ends with."""
+    (folder / "mine.py").write_text(plugins.text("burning") + more)
     method = isolation.build(f"mine.py:{name}", {}, folder)
     with isolation.opened(method, CPU) as ready:
         watch = cost.Stopwatch(CPU, ready.pid)
@@ -82,11 +31,11 @@ def at_work(folder: Path) -> list[psutil.Process]:
 
 
 @pytest.fixture(autouse=True)
-def in_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def in_the_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path: Path) -> None:
+def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path):
     taken = taken_by("Plain", tmp_path)
     assert taken.cpu_s is not None
     assert taken.memory_mib is not None
@@ -95,7 +44,7 @@ def test_a_method_that_does_nothing_takes_next_to_nothing(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", ["SetsPeakBack", "HasItDone", "LeavesIt"])
-def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(name: str, tmp_path: Path) -> None:
+def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(name, tmp_path):
     taken = taken_by(name, tmp_path)
     assert taken.memory_mib is not None
     assert MIB < taken.memory_mib < 2 * MIB
@@ -107,21 +56,21 @@ def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(na
         assert not at_work(tmp_path)
 
 
-def test_work_before_the_call_is_on_the_clock(tmp_path: Path) -> None:
+def test_work_before_the_call_is_on_the_clock(tmp_path):
     taken = taken_by("Plain", tmp_path, "\nos.register_at_fork(after_in_child=burn)\n")
     assert taken.seconds > 0.3
     assert taken.cpu_s is not None
     assert taken.cpu_s > 0.3
 
 
-def test_processes_that_start_with_its_import_are_refused(tmp_path: Path) -> None:
+def test_processes_that_start_with_its_import_are_refused(tmp_path):
     start = f"\nsubprocess.Popen([sys.executable, '-c', {BURNER.format(mib=1, more=True)!r}, os.getcwd()])\n"
     with pytest.raises(Exception, match="starts processes while its file is imported; start them in solve or prepare"):
         taken_by("Plain", tmp_path, start)
     assert not at_work(tmp_path)
 
 
-def test_of_this_process_all_its_processors_count() -> None:
+def test_of_this_process_all_its_processors_count():
     watch = cost.Stopwatch()
     subprocess.run([sys.executable, "-c", "import time\nwhile time.process_time() < 0.3: pass"], check=True)
     taken = watch.stop()

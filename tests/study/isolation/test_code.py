@@ -1,7 +1,5 @@
 """A method whose code or files were edited is another one, however it is written."""
 
-from __future__ import annotations
-
 import sys
 import tokenize
 from collections.abc import Callable
@@ -65,8 +63,7 @@ FORMS = {
         "    solve = functools.partialmethod(_solve, odd=1)\n"
     ),
     "callable object": of_class(
-        "    solve = Scaled()\n",
-        "class Scaled:\n    def __call__(self, target, bench):\n        return 1.0 * target\n",
+        "    solve = Scaled()\n", "class Scaled:\n    def __call__(self, target, bench):\n        return 1.0 * target\n"
     ),
     "subclass that sets a class variable": of_class(
         "    scale: ClassVar[float] = 0\n    def solve(self, target, bench):\n        return self.scale * target\n"
@@ -101,9 +98,9 @@ FORMS = {
 
 
 def write(folder: Path, form: Form) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("mine.py", form.main), form.other):
         if name:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text)
 
 
@@ -140,7 +137,7 @@ def assert_an_edit_is_seen(folder: Path, form: Form, build: Callable[[Path], Any
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_an_edit_makes_another_method_inside(name: str, tmp_path: Path) -> None:
+def test_an_edit_makes_another_method_inside(name, tmp_path):
     assert_an_edit_is_seen(tmp_path, FORMS[name], inside)
 
 
@@ -154,7 +151,7 @@ def test_an_edit_makes_another_method_inside(name: str, tmp_path: Path) -> None:
         "weights in solve",
     ],
 )
-def test_an_edit_makes_another_method_apart(name: str, tmp_path: Path) -> None:
+def test_an_edit_makes_another_method_apart(name, tmp_path):
     assert_an_edit_is_seen(tmp_path, FORMS[name], apart)
 
 
@@ -177,11 +174,9 @@ PARTS = {  # where a number may be
 }
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.data())
-def test_any_token_that_is_edited_makes_another_method(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
+def test_any_token_that_is_edited_makes_another_method(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("random")
     names = data.draw(st.lists(st.sampled_from(["a_", "b_.c_", "d_.e_.f_", "g_", "h_.i_"]), unique=True), "modules")
     files = {f"{name.replace('.', '/')}.py": name for name in names}
@@ -210,66 +205,57 @@ def test_any_token_that_is_edited_makes_another_method(
     assert method_version(type(inside(folder))) != before
 
 
-def test_what_is_refused_says_why(tmp_path: Path) -> None:
+def test_what_is_refused_says_why(tmp_path):
     write(tmp_path, of_class(SOLVE, "from ..above import scaled"))
     with pytest.raises(UserError, match=r"mine.py:Mine'.*attempted relative import beyond top-level package"):
         inside(tmp_path)
 
 
-LIBRARY = "def late():\n    import beside_\n    return beside_.NAME\n"
-
-
-def test_a_module_beside_is_what_the_file_imports_and_no_library(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_module_beside_is_what_the_file_imports_and_no_library(tmp_path, monkeypatch):
     installed, own = tmp_path / "installed", tmp_path / "own"
     for folder in (installed, own):
         folder.mkdir()
         (folder / "beside_.py").write_text(f"NAME = '{folder.name}'")
-    (installed / "library_.py").write_text(LIBRARY)
+    (installed / "library_.py").write_text("def late():\n    import beside_\n    return beside_.NAME\n")
     monkeypatch.syspath_prepend(installed)
     for name in ("types", "holobench_eval"):
         (own / f"{name}.py").write_text("raise SystemExit")
-    top = "import types, holobench_eval.core, library_\nFIRST = library_.late()\ndel library_.sys\nimport beside_"
+    top = "import sys, types, holobench_eval.core, library_\nFIRST = library_.late()\ndel sys.modules['beside_']\n"
     solve = "    def solve(self, target, bench):\n        return FIRST, beside_.NAME\n"
-    write(own, of_class(solve, top.replace("del library_.sys", "import sys\ndel sys.modules['beside_']")))
+    write(own, of_class(solve, f"{top}import beside_"))
     assert inside(own).solve(0, None) == ("installed", "own")
     monkeypatch.delitem(sys.modules, "library_")
 
 
-def test_two_folders_with_a_helper_of_one_name_have_each_their_own(tmp_path: Path) -> None:
+def test_two_folders_with_a_helper_of_one_name_have_each_their_own(tmp_path):
     methods = []
     for number, name in enumerate(("a", "b")):
-        (tmp_path / name).mkdir()
         write(tmp_path / name, FORMS["helper, absolute"])
         (tmp_path / name / "helper.py").write_text(SCALED.replace("1.0", str(number)))
         methods.append(inside(tmp_path / name))
     assert [method.solve(2.0, None) for method in methods] == [0.0, 2.0]
 
 
-def test_the_name_in_the_file_counts(tmp_path: Path) -> None:
+def test_the_name_in_the_file_counts(tmp_path):
     (tmp_path / "mine.py").write_text("def one(target, bench): ...\n\ndef two(target, bench): ...\n")
     versions = {method_version(plugins.find("methods", f"mine.py:{name}", tmp_path)) for name in ("one", "two")}
     assert len(versions) == 2
 
 
-def test_a_module_of_the_studys_folder_is_code_of_all_that_import_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "lib").mkdir()
+def test_a_module_of_the_studys_folder_is_code_of_all_that_import_it(tmp_path, monkeypatch):
     library = tmp_path / "lib" / "library_of_a_study.py"
+    library.parent.mkdir()
     library.write_text(SCALED)
-    monkeypatch.syspath_prepend(tmp_path / "lib")
+    monkeypatch.syspath_prepend(library.parent)
 
     def versions() -> list[str]:
         names = [f"methods/{name}.py:Mine" for name in ("a", "b", "a")]
         return [method_version(plugins.find("methods", name, tmp_path)) for name in names]
 
+    (tmp_path / "methods").mkdir()
     for name in ("a", "b"):
-        (tmp_path / "methods").mkdir(exist_ok=True)
-        (tmp_path / "methods" / f"{name}.py").write_text(
-            of_class(SOLVE, "from library_of_a_study import scaled").main + f"# {name}"
-        )
+        text = of_class(SOLVE, "from library_of_a_study import scaled").main
+        (tmp_path / "methods" / f"{name}.py").write_text(f"{text}# {name}")
     first, other, again = versions()
     assert first == again != other
     assert method_version(isolation.find("methods/b.py:Mine", tmp_path)) == other
@@ -278,7 +264,7 @@ def test_a_module_of_the_studys_folder_is_code_of_all_that_import_it(
     assert plugins.build("methods", "methods/b.py:Mine", {}, tmp_path).solve(2.0, None) == 0.2
 
 
-def test_what_the_import_itself_writes_is_no_code(tmp_path: Path) -> None:
+def test_what_the_import_itself_writes_is_no_code(tmp_path):
     top = "from pathlib import Path\nlog = Path(__file__).with_name('log.txt')\nlog.write_text(log.read_text() + '1')"
     write(tmp_path, of_class("    def solve(self, target, bench):\n        return target\n", top))
     (tmp_path / "log.txt").write_text("")
@@ -287,7 +273,7 @@ def test_what_the_import_itself_writes_is_no_code(tmp_path: Path) -> None:
     assert code_of(first).uncovered == (str(tmp_path / "log.txt"),)
 
 
-def test_a_method_that_was_edited_after_it_was_asked_for_is_not_called(tmp_path: Path) -> None:
+def test_a_method_that_was_edited_after_it_was_asked_for_is_not_called(tmp_path):
     form = FORMS["helper, absolute"]
     write(tmp_path, form)
     method = apart(tmp_path)
@@ -297,7 +283,7 @@ def test_a_method_that_was_edited_after_it_was_asked_for_is_not_called(tmp_path:
 
 
 @pytest.mark.parametrize("build", [inside, apart])
-def test_a_helper_that_is_edited_while_a_call_runs_is_read(tmp_path: Path, build: Callable[[Path], Any]) -> None:
+def test_a_helper_that_is_edited_while_a_call_runs_is_read(tmp_path, build):
     editor = "import subprocess\nEDIT = ['sed', '-i', 's/1.0/0.1/', __file__.replace('mine.py', 'helper.py')]"
     body = (
         "    def solve(self, target, bench):\n        subprocess.run(EDIT)\n"

@@ -1,7 +1,5 @@
 """Files that a method reads are part of a cell's identity, and phases that were saved score what they scored."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +8,8 @@ import pytest
 from PIL import Image
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import Plan, plan
-from tests.study.studies import TWO, compute, write_study
+from holobench_eval.study.plan import Plan
+from tests.study.studies import TWO, compute, planned, write_study
 
 IDEAL = "{profiles: [ideal], panel: [128, 128]}"
 AGED = "{profiles: [leto-aged], panel: [128, 128]}"
@@ -27,7 +24,7 @@ def scores(records: list[dict[str, Any]], label: str) -> list[tuple[str, dict[st
 
 
 @pytest.mark.slow
-def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path: Path) -> None:
+def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_path):
     made = compute(config(tmp_path, "made", "double_phase"), tmp_path / "made").records
     saved = tmp_path / "made" / "phases" / "double_phase" / "leto-aged"
     read = f'{{name: phases, label: read, params: {{file: "{saved}/{{target}}.npy"}}}}'
@@ -35,21 +32,17 @@ def test_saved_phases_score_what_they_scored_and_are_saved_byte_for_byte(tmp_pat
     again = compute(config(tmp_path, "read", f"{read}, {levels}"), tmp_path / "read").records
     assert scores(again, "read") == scores(made, "double_phase")
     assert scores(again, "levels") == scores(made, "double_phase")  # 8 bits are what this panel shows
-    assert {record["seconds"] is None for record in again if record["label"] in ("read", "levels")} == {True}
-    assert {record["seconds"] is None for record in made if record["label"] == "double_phase"} == {False}
+    untimed = {record["label"] for record in made + again if record["seconds"] is None}
+    assert untimed & {"read", "levels", "double_phase"} == {"read", "levels"}
     for file in saved.iterdir():
         assert (tmp_path / "read" / "phases" / "read" / "leto-aged" / file.name).read_bytes() == file.read_bytes()
-
-
-def planned(path: Path) -> Plan:
-    return plan(load_study(path))
 
 
 def ids(grid: Plan) -> dict[str, str]:
     return {cell.target: cell.id for label, cell in grid.labelled() if label == "phases"}
 
 
-def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_file_is_another_cell_of_its_target_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = config(tmp_path, "files", '{name: phases, params: {file: "{target}.npy"}}')
     with pytest.raises(UserError, match=r"none of the files that it reads is there, such as astronaut\.npy"):
@@ -68,7 +61,7 @@ def test_another_file_is_another_cell_of_its_target_alone(tmp_path: Path, monkey
 
 
 @pytest.fixture
-def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def pictures(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("pictures").mkdir()
     for seed, name in enumerate(("a.jpg", "a.png", "red cup.png")):
@@ -85,16 +78,15 @@ def named(pictures: Path, file: str, amplitude: str = "") -> Path:
 
 
 @pytest.mark.parametrize("files", [("{stem}.npy",), ("{target}.npy", "{stem}.npy"), ("{stem}-{channel}.npy",)])
-def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures: Path, files: tuple[str, ...]) -> None:
+def test_two_targets_with_the_same_file_are_refused_by_the_plan(pictures, files):
     message = r"method 'phases': '\{stem\}.*\.npy' is the same file, a.*\.npy, for the targets 'a\.jpg' and 'a\.png'; "
-    with pytest.raises(UserError, match=message) as refused:
+    with pytest.raises(UserError, match=f"^{message}.*$"):
         planned(named(pictures, *files))
-    assert "\n" not in str(refused.value)
     (pictures / "a.jpg").unlink()
     assert len(ids(planned(named(pictures, "{stem}.npy")))) == 2
 
 
-def test_one_file_for_all_targets_is_no_mistake_and_a_target_with_an_altered_name_is_named(pictures: Path) -> None:
+def test_one_file_for_all_targets_is_no_mistake_and_a_target_with_an_altered_name_is_named(pictures):
     assert len(set(ids(planned(named(pictures, "a.npy"))).values())) == 3
     for name in ("a.jpg", "a.png"):
         (pictures / name).unlink()
@@ -116,9 +108,7 @@ mine.files = lambda target_name: ["mine.npy"]
 """
 
 
-def test_a_method_of_a_file_says_which_files_it_reads_and_one_that_changed_after_planning_is_not_taken_for_the_planned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_a_method_says_it_reads_and_that_changed_after_planning_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "method.py").write_text(METHOD)
     path = config(tmp_path, "files", '"method.py:mine"')

@@ -1,7 +1,5 @@
 """A method in a process of its own gives what it gives inside, and its process ends with its call."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -14,46 +12,11 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation import process
 from holobench_eval.study.isolation.process import process_of
-from tests.study.studies import MILD, TWO, compute, write_study
+from tests.study.studies import compute, one_line, write_green, write_study
+from tests.support import plugins
 from tests.support.patience import PATIENCE
 
-METHODS = '''
-import time
-from dataclasses import dataclass
-from typing import ClassVar
-
-import torch
-
-SLOW = time.sleep(0.05)
-
-
-@dataclass(frozen=True)
-class Mine:
-    """Flat phases.
-
-    And more.
-    """
-
-    level: float = 1.0
-    camera: ClassVar[bool] = True
-    tuned: ClassVar[str] = "on nothing"
-
-    def available(self):
-        return "no level" if self.level == 0 else None
-
-    def solve(self, target, bench):
-        shape = (*target.shape[:2], *bench.spec.shape)
-        phase = torch.rand(shape, generator=bench.generator("start", 1)) * self.level
-        for _ in range(2):
-            phase = phase + bench.rectify(bench.capture(phase[0])).mean()
-        bench.keep(phase)
-        return phase
-
-
-@dataclass(frozen=True)
-class Odd(Mine):
-    camera: ClassVar[str] = "yes"
-'''
+METHODS = plugins.text("mine")
 
 SHIPPED = (
     "double_phase",
@@ -66,7 +29,7 @@ SHIPPED = (
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> str:
+def file(tmp_path):
     (tmp_path / "mine.py").write_text(METHODS)
     return str(tmp_path / "mine.py")
 
@@ -75,14 +38,14 @@ def digits(records: list[dict[str, Any]]) -> list[Any]:
     return [[record["label"], record["state"], record["scores"], record["captures"]] for record in records]
 
 
-def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
-    cls = isolation.find(f"{file}:Mine", Path())
-    assert (cls.__name__, cls.__doc__) == ("Mine", "Flat phases.\n\nAnd more.")
+def test_what_a_method_declares_is_known_without_its_code(file):
+    cls, method = isolation.find(f"{file}:Mine", Path()), isolation.build(f"{file}:Mine", {}, Path())
     declared = cls.camera, cls.tuned, hasattr(cls, "predict"), hasattr(cls, "trains")
-    assert declared == (True, "on nothing", False, False)
-    method = isolation.build(f"{file}:Mine", {}, Path())
-    assert isolation.params_of(method) == {"level": 1.0}
-    assert method.available() is None
+    assert (cls.__name__, cls.__doc__, *declared) == (
+        *("Mine", "Flat phases.\n\nAnd more."),
+        *(True, "on nothing", False, False),
+    )
+    assert (isolation.params_of(method), method.available()) == ({"level": 1.0}, None)
     assert isolation.build(f"{file}:Mine", {"level": 0.0}, Path()).available() == "no level"
 
 
@@ -95,32 +58,38 @@ def test_what_a_method_declares_is_known_without_its_code(file: str) -> None:
         ("None", {}, "has no 'None'"),
     ],
 )
-def test_what_is_wrong_with_a_method_is_told_in_one_line(
-    file: str, name: str, params: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(UserError, match=message.replace("(", r"\(")) as caught:
+def test_what_is_wrong_with_a_method_is_told_in_one_line(file, name, params, message):
+    with one_line(message):
         isolation.build(f"{file}:{name}", params, Path())
-    assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("end", ["import os; os._exit(0)", "raise KeyboardInterrupt", "raise SystemExit(0)"])
-def test_a_file_that_ends_its_process_is_refused_in_one_line(tmp_path: Path, end: str) -> None:
-    (tmp_path / "ends.py").write_text(end)
-    with pytest.raises(UserError, match=r"ends.py:Any'.*import"):
-        isolation.find("ends.py:Any", tmp_path)
+THREADS = (
+    "from threading import Event, Thread\nThread(target=Event().wait, daemon=True).start()\n\n\n"
+    "def Any(target, bench): ...\n"
+)
+ABORTS = (
+    "import os\nfrom dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Any:\n"
+    "    def __post_init__(self):\n        os.abort()\n\n    def solve(self, target, bench):\n        return target\n"
+)
 
 
-def test_a_process_that_ends_while_its_study_is_read_is_told_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "ends.py").write_text(
-        "import os\nfrom dataclasses import dataclass\n\n@dataclass(frozen=True)\nclass Ends:\n"
-        "    def __post_init__(self):\n        os.abort()\n\n"
-        "    def solve(self, target, bench):\n        return target\n"
-    )
-    with pytest.raises(UserError, match=r"'ends.py:Ends' does not give its parameters: .*SIGABRT"):
-        isolation.build("ends.py:Ends", {}, tmp_path)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("import os; os._exit(0)", "ends.py:Any'.*import"),
+        ("raise KeyboardInterrupt", "ends.py:Any'.*import"),
+        ("raise SystemExit(0)", "ends.py:Any'.*import"),
+        (THREADS, "starts threads while its file is imported"),
+        (ABORTS, "'ends.py:Any' does not give its parameters: .*SIGABRT"),
+    ],
+)
+def test_a_file_that_cannot_be_a_method_s_is_refused_in_one_line(tmp_path, text, message):
+    (tmp_path / "ends.py").write_text(text)
+    with pytest.raises(UserError, match=message):
+        isolation.build("ends.py:Any", {}, tmp_path)
 
 
-def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> None:
+def test_a_method_is_imported_once_until_a_file_beside_it_changes(file):
     first = process_of(f"{file}:Mine", Path())
     assert process_of(f"{file}:Mine", Path()) is first
     assert first.facts.seconds > 0.05
@@ -128,85 +97,47 @@ def test_a_method_is_imported_once_until_a_file_beside_it_changes(file: str) -> 
     assert process_of(f"{file}:Mine", Path()) is not first
 
 
+LEARNS = plugins.text("learns")
+LEAVES = "{dataset: dead_leaves, params: {count: 3}, held_out: 1, captures: 60}"
+
+
+def computed(folder: Path, isolation: str, *methods: str) -> list[Any]:
+    """The digits of a study of one laser."""
+    folder.mkdir()
+    write_green(folder, "leto-mild")
+    for name in ("mine", "learns"):
+        (folder / f"{name}.py").write_text(plugins.text(name))
+    display = "{profiles: [green.yaml], panel: [128, 160]}"
+    config = write_study(folder / "study.yaml", *methods, display=display, training=LEAVES, isolation=isolation)
+    found = digits(compute(config, folder / "out").records)
+    assert list((folder / "artifacts").iterdir())  # each has trained for itself
+    return found
+
+
 @pytest.mark.slow
-def test_what_ships_has_the_digits_that_it_has_inside(tmp_path: Path) -> None:
-    found = []
-    for where in ("process", "files"):
-        (tmp_path / where).mkdir()
-        config = write_study(
-            tmp_path / where / "study.yaml",
-            *SHIPPED,
-            display=MILD,
-            training="{dataset: dead_leaves, params: {count: 4}, held_out: 1, captures: 60}",
-            isolation=where,
-        )
-        found.append(digits(compute(config, config.parent / "out").records))
-        assert list((config.parent / "artifacts").iterdir())  # each has trained for itself
-    assert found[0] == found[1]
-    assert {state for _, state, *_ in found[0]} == {"done"}
+def test_what_ships_has_the_digits_that_it_has_inside(tmp_path):
+    apart, inside = (computed(tmp_path / where, where, *SHIPPED) for where in ("process", "files"))
+    assert apart == inside
+    assert {state for _, state, *_ in apart} == {"done"}
 
 
-LEAVES = "{dataset: dead_leaves, params: {count: 2}, held_out: 1}"
-LEARNS = """
-from dataclasses import dataclass
-from typing import ClassVar
-
-import torch
-
-
-@dataclass(frozen=True)
-class Learns:
-    trains: ClassVar[bool] = True
-    odd: bool = False
-
-    def prepare(self, bench):
-        phase = torch.rand((3, *bench.spec.shape), generator=bench.generator("phase", 1, ("a", 2.5)))
-        seen = bench.photograph(phase, bench.images[0], "capture", 1, ("a", 2.5))
-        held = bench.kept("means", lambda: {"mean": seen.mean()})
-        bench.log(round=1, step=0, mean=float(held["mean"]))
-        odd = {"odd": object()} if self.odd else {}
-        return {"seen": seen, "held": held, 3: [1.5, None, "text", (1, True)], **odd}
-
-    def solve(self, target, bench):
-        assert list(bench.learned[3][:3]) == [1.5, None, "text"]
-        light = bench.light.mean() + bench.learned["seen"].mean() + bench.learned["held"]["mean"]
-        return torch.zeros((*target.shape[:2], *bench.spec.shape)) + light
-"""
+def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path):
+    mine = "{name: 'mine.py:Mine', captures: 3}", "{name: 'mine.py:Mine', label: short, captures: 1}"
+    apart, inside = (computed(tmp_path / where, where, "'learns.py:Learns'", *mine) for where in ("files", "none"))
+    assert apart == inside
+    found = {label: (state, captures) for label, state, _, captures in apart}
+    assert (found["Learns"], found["Mine"], found["short"][1]) == (("done", 0), ("done", 2), 1)
 
 
-def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path: Path) -> None:
-    found = []
-    for where in ("files", "none"):
-        folder = tmp_path / where
-        folder.mkdir()
-        (folder / "learns.py").write_text(LEARNS)
-        (folder / "mine.py").write_text(METHODS)
-        config = write_study(
-            folder / "study.yaml",
-            "'learns.py:Learns'",
-            "{name: 'mine.py:Mine', captures: 3}",
-            "{name: 'mine.py:Mine', label: short, captures: 1}",
-            display=MILD,
-            targets=TWO,
-            training=LEAVES,
-            isolation=where,
-        )
-        found.append(digits(compute(config, folder / "out").records))
-    assert found[0] == found[1]
-    learned, whole, short = ([row for row in found[0] if row[0] == label] for label in ("Learns", "Mine", "short"))
-    assert [(state, captures) for _, state, _, captures in learned + whole] == [("done", 0)] * 2 + [("done", 2)] * 2
-    assert [captures for *_, captures in short] == [1, 1]
-
-
-def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path: Path) -> None:
+def test_what_cannot_be_kept_is_refused_where_it_was_learned(tmp_path, no_physics):
     (tmp_path / "learns.py").write_text(LEARNS)
     odd = "{name: 'learns.py:Learns', params: {odd: true}}"
-    records = compute(write_study(tmp_path / "study.yaml", odd, training=LEAVES), tmp_path / "out").records
-    (reason,) = {record["reason"] for record in records if record["label"] == "Learns"}
+    config = write_study(tmp_path / "study.yaml", odd, training=LEAVES)
+    reason = compute(config, tmp_path / "out").records[-1]["reason"]
     assert "what prepare returned: a value is object; expected tensors" in reason
 
 
-def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path: Path) -> None:
+def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_path):
     text = METHODS.replace("camera: ClassVar[bool] = True", "privileged: ClassVar[bool] = True")
     (tmp_path / "mine.py").write_text(text)
     config = write_study(tmp_path / "study.yaml", "'mine.py:Mine'")
@@ -214,76 +145,51 @@ def test_a_privileged_method_of_a_file_is_refused_where_the_bench_is_not(tmp_pat
         compute(config, tmp_path / "out")
 
 
-def test_files_that_a_method_names_by_their_paths_are_known_apart(tmp_path: Path) -> None:
+def test_paths_that_a_method_names_are_known_apart_and_its_call_has_the_threads_of_the_harness(tmp_path):
     (tmp_path / "named.py").write_text(
-        "from pathlib import Path\n\n\ndef named(target, bench): ...\n\n\nnamed.files = lambda item: [Path(item)]\n"
+        "import torch\nfrom pathlib import Path\n\n\ndef named(target, bench): ...\n\n\n"
+        "named.files = lambda item: [Path(item)]\nnamed.available = lambda: str(torch.get_num_threads())\n"
         "named.external = lambda: {'weights': Path('weights.pt'), 'none': None}\n"
-    )
-    method = isolation.build("named.py:named", {}, tmp_path)
-    assert method.files("a.npy") == ["a.npy"]
-    assert method.external() == {"weights": "weights.pt", "none": None}
-
-
-def test_threads_of_the_harness_are_those_of_a_call(tmp_path: Path) -> None:
-    (tmp_path / "threads.py").write_text(
-        "import torch\n\n\ndef threads(target, bench): ...\n\n\n"
-        "threads.available = lambda: str(torch.get_num_threads())\n"
     )
     before = torch.get_num_threads()
     torch.set_num_threads(3)
     try:
-        assert isolation.build("threads.py:threads", {}, tmp_path).available() == "3"
+        method = isolation.build("named.py:named", {}, tmp_path)
+        found = method.files("a.npy"), method.external(), method.available()
     finally:
         torch.set_num_threads(before)
+    assert found == (["a.npy"], {"weights": "weights.pt", "none": None}, "3")
 
 
 def solved(tmp_path: Path, body: str, top: str = "", **more: str) -> dict[str, Any]:
     """The record of a method of a file, from what is at its top and in its ``solve``."""
-    (tmp_path / "one.py").write_text(
-        f"""import os, time
-from dataclasses import dataclass
-
-import torch
-{top}
-
-
-@dataclass(frozen=True)
-class One:
-    def solve(self, target, bench):
-        {body}
-        return torch.zeros((*target.shape[:2], *bench.spec.shape))
-"""
-    )
-    config = write_study(tmp_path / "study.yaml", "'one.py:One'", limits="{seconds: 60}", **more)
-    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "One")
+    answer = "return torch.zeros((*target.shape[:2], *bench.spec.shape))"
+    code = f"import os, time\nimport torch\n{top}\n\n\ndef one(target, bench):\n    {body}\n    {answer}\n"
+    (tmp_path / "one.py").write_text(code)
+    config = write_study(tmp_path / "study.yaml", "'one.py:one'", limits="{seconds: 60}", **more)
+    (record,) = (r for r in compute(config, tmp_path / "out").records if r["label"] == "one")
     return record
 
 
-def test_time_and_memory_are_those_of_the_call(tmp_path: Path) -> None:
+def test_time_and_memory_are_those_of_the_call(tmp_path, no_physics):
     record = solved(tmp_path, "held = torch.ones(2**26); time.sleep(0.3)")
     assert 0.3 < record["seconds"] < 20
     assert record["memory_mib"] is None or 250 < record["memory_mib"] < 400  # 256 MiB are held
 
 
-def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path: Path) -> None:
+def test_what_a_method_leaves_running_does_not_keep_its_end_from_the_harness(tmp_path, no_physics):
     record = solved(tmp_path, "(os.fork() or time.sleep(10_000)) and os._exit(3)")
     assert "ended with exit code 3" in record["reason"]
 
 
-def test_a_file_that_starts_threads_is_refused_since_it_cannot_be_forked(tmp_path: Path) -> None:
-    top = "import threading; threading.Thread(target=time.sleep, args=(60,), daemon=True).start()"
-    with pytest.raises(UserError, match="starts threads while its file is imported"):
-        solved(tmp_path, "pass", top)
-
-
-def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path: Path) -> None:
+def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path, no_physics):
     top = "from holobench_eval.display.simulated.profile import load_profile"
-    with pytest.raises(UserError, match=r"one.py:One' imports holobench_eval.display.simulated.*'isolation: none'"):
+    with pytest.raises(UserError, match=r"one.py:one' imports holobench_eval.display.simulated.*'isolation: none'"):
         solved(tmp_path, "load_profile(bench.spec.name)", top)
     assert solved(tmp_path, "load_profile(bench.spec.name)", top, isolation="none")["state"] == "done"
 
 
-def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_methods_that_have_ended_keep_no_files_open(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "KEPT", 2)
     monkeypatch.setattr(process, "_processes", [])
     counts = []
@@ -297,7 +203,7 @@ def test_methods_that_have_ended_keep_no_files_open(tmp_path: Path, monkeypatch:
     assert counts[-1] == counts[3]
 
 
-def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path: Path) -> None:
+def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path):
     (tmp_path / "work").mkdir()
     deaf = "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
     (tmp_path / "work/random.py").write_text(f"{deaf}def Mine(target, bench):\n    return target\n")
@@ -311,7 +217,7 @@ def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_f
     assert (done.returncode, done.stdout.count("Mine")) == (0, 1), done.stderr
 
 
-def test_a_method_s_own_processes_know_its_file(tmp_path: Path) -> None:
+def test_a_method_s_own_processes_know_its_file(tmp_path, no_physics):
     top = "import multiprocessing\n\n\ndef half(number):\n    return number / 2"
     body = "with multiprocessing.Pool(1) as pool:\n            assert pool.map(half, [4.0]) == [2.0]"
     assert solved(tmp_path, body, top)["reason"] == ""

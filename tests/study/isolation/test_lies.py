@@ -1,7 +1,5 @@
 """What a method's process says of itself, right or wrong, is taken or refused in one line."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -15,27 +13,9 @@ from holobench_eval.study import isolation
 from holobench_eval.study.definition import Limits
 from holobench_eval.study.isolation.messages import Channel
 from holobench_eval.study.versions import method_version
+from tests.support import plugins
 
-METHOD = """
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Mine:
-    level: float = 1.0
-
-    def solve(self, target, bench):
-        return target
-
-    def available(self):
-        return None
-
-    def files(self, target):
-        return []
-
-    def external(self):
-        return {}
-"""
+METHOD = plugins.text("plain")
 NUL, ESCAPE, HALF = "\0", "\x1b[31m", "\ud800"  # no text for a system, for a terminal, for a file
 FACTS: dict[str, list[Any]] = {
     "name": [NUL, "", 3, "x" * 10**6, HALF, ESCAPE],
@@ -62,7 +42,6 @@ RESULTS: dict[str, list[Any]] = {
     "external": [3, [], {"a": 3}, {3: "a"}, {"a": "\0"}],
 }
 NUMBERS = ["x", 10**30, None, [1], math.nan]
-Lie = Callable[[Callable[[Any], Any]], None]
 RECEIVE, SEND = Channel.receive, Channel.send
 
 
@@ -81,7 +60,7 @@ def use(folder: Path) -> None:
 
 
 @pytest.fixture
-def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lie:
+def lie(tmp_path, monkeypatch):
     """Use a method whose process tells something else, as a function makes it of what it really tells."""
     (tmp_path / "mine.py").write_text(METHOD)
 
@@ -92,7 +71,7 @@ def lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lie:
     return used
 
 
-def test_the_truth_is_taken(lie: Lie) -> None:
+def test_the_truth_is_taken(lie):
     asked = list[Any]()
     lie(lambda told: asked.append(told) or told)
     assert any(isinstance(told, dict) and told.get("name") == "Mine" for told in asked)
@@ -105,7 +84,7 @@ def each(values: dict[str, list[Any]]) -> list[tuple[str, Any]]:
 @pytest.mark.parametrize(
     ("part", "name", "value"), [*(("", *one) for one in each(FACTS)), *(("code", *one) for one in each(CODE))]
 )
-def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part: str, name: str, value: Any, lie: Lie) -> None:
+def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part, name, value, lie):
     def change(told: Any) -> Any:
         if not (isinstance(told, dict) and "flags" in told):
             return told
@@ -116,7 +95,7 @@ def test_facts_that_cannot_be_and_code_that_is_not_that_of_the_file(part: str, n
 
 
 @pytest.mark.parametrize(("name", "value"), each(RESULTS))
-def test_results_that_no_function_has(name: str, value: Any, lie: Lie, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_no_function_has(name, value, lie, monkeypatch):
     asked = [""]
 
     def send(channel: Channel, told: Any) -> None:
@@ -130,6 +109,6 @@ def test_results_that_no_function_has(name: str, value: Any, lie: Lie, monkeypat
 
 
 @pytest.mark.parametrize("value", NUMBERS)
-def test_numbers_that_no_process_has(value: Any, lie: Lie) -> None:
+def test_numbers_that_no_process_has(value, lie):
     with pytest.raises((UserError, CellError), match="method"):
         lie(lambda told: value if type(told) is int else told)

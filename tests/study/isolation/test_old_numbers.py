@@ -1,7 +1,5 @@
 """No old number stands for what has changed: code and files that a study uses besides the code of its methods."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 from typing import Any
@@ -12,46 +10,10 @@ from holobench_eval.study.artifacts import Artifacts
 from holobench_eval.study.phases import RESULTS, Phases
 from tests.study.studies import TURNS
 from tests.study.studies import compute as compute_with
-from tests.support.trained_study import compute, needs, write
+from tests.support import plugins
+from tests.support.studies.trained_study import compute, needs, write
 
-READING = """
-from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar
-
-import torch
-
-
-def amount(file=Path(__file__).with_name("data.txt")):
-    return float(Path(file).read_text())
-
-
-@dataclass(frozen=True)
-class Mine:
-    def solve(self, target, bench):
-        return self.amount(bench) * torch.rand((1, 3, *bench.spec.shape), generator=torch.Generator().manual_seed(0))
-
-    def amount(self, bench):
-        return amount()
-
-
-class Learning(Mine):
-    trains: ClassVar[bool] = True
-
-    def prepare(self, bench):
-        return {"amount": torch.tensor(amount())}
-
-    def amount(self, bench):
-        return float(bench.learned["amount"])
-
-
-@dataclass(frozen=True)
-class Named(Mine):
-    file: str = "data.txt"
-
-    def amount(self, bench):
-        return amount(self.file)
-"""
+READING = plugins.text("reading")
 
 
 def reading(folder: Path, amount: float) -> None:
@@ -73,28 +35,9 @@ def psnr(outcome: Any, label: str = "") -> list[float]:
     return [row["scores"]["psnr_linear"] for row in rows]
 
 
-IMAGES = (
-    READING
-    + """
-
-@dataclass(frozen=True)
-class Images:
-    def items(self):
-        return ["a", "b"]
-
-    def digest(self, item):
-        return 64 * item
-
-    def load(self, item, shape, channels=3):
-        return torch.rand((channels, *shape), generator=torch.Generator().manual_seed(ord(item))) * amount()
-"""
-)
-
-
 @pytest.mark.parametrize("use", ["targets", "training"])
-def test_a_file_that_images_are_made_with_counts_though_their_digests_do_not_tell(tmp_path: Path, use: str) -> None:
+def test_a_file_that_images_are_made_with_counts_though_their_digests_do_not_tell(tmp_path, use):
     reading(tmp_path, 1.0)
-    (tmp_path / "mine.py").write_text(IMAGES)
     method, old = {
         "targets": ("double_phase", '"trained.py:Pictures", params: {count: 1}'),
         "training": ('"trained.py:Gain"', '"trained.py:Unseen"'),
@@ -108,14 +51,14 @@ def test_a_file_that_images_are_made_with_counts_though_their_digests_do_not_tel
     assert psnr(after) == psnr(compute(config, "fresh"))
 
 
-def test_the_same_code_at_two_places_reads_what_lies_beside_it(tmp_path: Path) -> None:
+def test_the_same_code_at_two_places_reads_what_lies_beside_it(tmp_path):
     reading(tmp_path / "a", 1.0)
     reading(tmp_path / "b", 6.0)
     outcome = compute(using(tmp_path, "{name: 'a/mine.py:Mine', label: a}, {name: 'b/mine.py:Mine', label: b}"))
     assert psnr(outcome, "a") != psnr(outcome, "b")
 
 
-def test_what_was_learned_is_learned_again_for_another_file_and_scored_again_when_replaced(tmp_path: Path) -> None:
+def test_what_was_learned_is_learned_again_for_another_file_and_scored_again_when_replaced(tmp_path):
     reading(tmp_path, 1.0)
     config = using(tmp_path, "'mine.py:Learning'")
     before = psnr(compute(config))
@@ -138,7 +81,7 @@ def test_what_was_learned_is_learned_again_for_another_file_and_scored_again_whe
     assert compute(config).computed == 0  # where nothing is there now, nothing else is known
 
 
-def test_the_file_that_a_hologram_was_made_with_counts_for_its_predictions(tmp_path: Path) -> None:
+def test_the_file_that_a_hologram_was_made_with_counts_for_its_predictions(tmp_path):
     reading(tmp_path, 1.0)
     probe = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {name: 'mine.py:Mine'}")
     config = using(tmp_path, '"trained.py:Even"', probe)
@@ -149,9 +92,7 @@ def test_the_file_that_a_hologram_was_made_with_counts_for_its_predictions(tmp_p
     assert psnr(after) != psnr(before)
 
 
-def test_a_file_that_a_parameter_names_is_the_one_of_the_working_directory_and_of_its_code_that_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_parameter_names_a_file_of_the_working_directory_and_code_one_beside_it(tmp_path, monkeypatch):
     reading(tmp_path / "study", 1.0)
     oracle = "{name: oracle, params: {start_iterations: 1, rounds: 1}}"
     config = using(tmp_path / "study", f"'mine.py:Named', 'mine.py:Mine', {oracle}")
@@ -165,7 +106,7 @@ def test_a_file_that_a_parameter_names_is_the_one_of_the_working_directory_and_o
     assert psnr(found[0], "oracle")
 
 
-def test_a_phase_is_solved_by_one_at_a_time(tmp_path: Path) -> None:
+def test_a_phase_is_solved_by_one_at_a_time(tmp_path):
     phases, order = Phases(tmp_path), list[str]()
 
     def second() -> None:
@@ -181,7 +122,7 @@ def test_a_phase_is_solved_by_one_at_a_time(tmp_path: Path) -> None:
     assert order == ["first", "second"]
 
 
-def test_a_time_that_holds_one_that_was_shared_was_not_taken_alone(tmp_path: Path) -> None:
+def test_a_time_that_holds_one_that_was_shared_was_not_taken_alone(tmp_path):
     config = using(tmp_path, "{name: wirtinger, params: {iterations: 2, offset: none}}")
     shared = compute_with(config, tmp_path / RESULTS / "a", executor=TURNS)
     assert [row["alone"] for row in shared.records if row["label"] == "wirtinger"] == [False]

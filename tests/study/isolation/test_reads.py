@@ -1,25 +1,21 @@
 """What a method's calls read is known: by digest where the study can be held to it, else by name."""
 
-from __future__ import annotations
-
 import hashlib
 import os
-from collections.abc import Callable
 from multiprocessing import Pipe
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 import torch
 
-from holobench_eval.core import plugins
 from holobench_eval.core.device import CPU
 from holobench_eval.core.reads import STARTED, Seen
 from holobench_eval.study import isolation
 from holobench_eval.study.isolation.messages import Channel, GarbledError
 from holobench_eval.study.isolation.process import call
+from tests.study.isolation.test_code import apart, inside
 
 METHOD = """
 import os
@@ -69,22 +65,12 @@ class Mine:
 INSIDE = ("array.npy", "mapped.bin", "tensors.pt", "script.pt", "picture.png", "by_number.txt")
 
 
-def inside(folder: Path) -> Any:
-    return plugins.build("methods", "mine.py:Mine", {}, folder)
-
-
-def apart(folder: Path) -> Any:
-    return isolation.build("mine.py:Mine", {}, folder)
-
-
 def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("build", [inside, apart])
-def test_what_a_call_reads_is_covered_or_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: Callable[[Path], Any]
-) -> None:
+def test_what_a_call_reads_is_covered_or_named(tmp_path, monkeypatch, build):
     study, outside = tmp_path / "study", tmp_path / "outside"
     (outside / "tables").mkdir(parents=True)
     study.mkdir()
@@ -102,28 +88,20 @@ def test_what_a_call_reads_is_covered_or_named(
     method = build(study)
     with isolation.opened(method, CPU) as ready:
         method.solve(2.0, None)
-    named = [outside / "weights.bin", outside / "tables" / "one.txt"]
-    assert ready.reads.covered == {
-        **{name: sha256(study / name) for name in INSIDE},
-        **{str(path): sha256(path) for path in named},
-        "nothing.txt": "absent",
-    }
-    assert set(ready.reads.uncovered) == {
-        str(outside / "at_import.txt"),
-        str(outside / "other.txt"),
-        str(study / "count.txt"),
-        STARTED,
-    }
+    named = {str(path): sha256(path) for path in (outside / "weights.bin", outside / "tables" / "one.txt")}
+    assert ready.reads.covered == {name: sha256(study / name) for name in INSIDE} | named | {"nothing.txt": "absent"}
+    others = outside / "at_import.txt", outside / "other.txt", study / "count.txt"
+    assert set(ready.reads.uncovered) == {STARTED, *map(str, others)}
 
 
-def test_a_method_of_this_package_declares_what_it_reads() -> None:
+def test_a_method_of_this_package_declares_what_it_reads():
     method = isolation.build("double_phase", {}, Path())
     with isolation.opened(method, CPU) as ready:
         Path(__file__).read_text()
     assert ready.reads == isolation.Reads({}, ())
 
 
-def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp_path: Path) -> None:
+def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp_path):
     first, second = tmp_path / "a.txt", tmp_path / "b.txt"
     first.write_text("first")
     covered = {"a.txt": sha256(first), "b.txt": "absent"}
@@ -142,7 +120,7 @@ FILES = [[], {"a": (1, 2)}, {"a": "b"}, {1.5: None}]
 
 
 @pytest.mark.parametrize("told", [None, *({"read": files} for files in FILES), {"written": 3}, {"starts": "<script>"}])
-def test_reads_that_are_no_reads_are_refused(told: Any) -> None:
+def test_reads_that_are_no_reads_are_refused(told):
     ours, theirs = Pipe()
     Channel(theirs).send({"result": 1, "seen": told})
     with pytest.raises(GarbledError, match="no reads"):

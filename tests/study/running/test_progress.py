@@ -1,8 +1,5 @@
-from __future__ import annotations
-
 import io
 import math
-from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -16,7 +13,9 @@ from holobench_eval.study.running.progress import Lines, duration, watching
 from holobench_eval.study.running.run import run
 from holobench_eval.study.store import Record, Store
 from tests.study.studies import compute
-from tests.support.fake_study import write_config
+from tests.support.studies.fake_study import write_config
+
+pytestmark = pytest.mark.usefixtures("no_physics")
 
 
 def failed(task: planning.Task) -> list[Record]:
@@ -27,12 +26,12 @@ def failed(task: planning.Task) -> list[Record]:
 
 
 @pytest.fixture
-def task(tmp_path: Path) -> planning.Task:
+def task(tmp_path):
     """The last of a study."""
     return planning.plan(load_study(write_config(tmp_path))).tasks[-1]
 
 
-def test_plain_lines_come_at_most_every_few_seconds(task: planning.Task) -> None:
+def test_plain_lines_come_at_most_every_few_seconds(task):
     now = [0.0]
     lines: list[str] = []
     watch = Lines(lines.append, clock=lambda: now[0])
@@ -46,7 +45,7 @@ def test_plain_lines_come_at_most_every_few_seconds(task: planning.Task) -> None
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task: planning.Task, terminal: bool) -> None:
+def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task, terminal):
     text = io.StringIO()
     with watching(Console(file=text, force_terminal=terminal, width=120)) as watch:
         watch.planned(2, 1, 0)
@@ -57,8 +56,7 @@ def test_a_failure_is_told_at_once_and_counted_whatever_the_console_is(task: pla
     assert ("1 failed" in text.getvalue()) == terminal
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) -> None:
+def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path):
     config = write_config(tmp_path, ('{name: "plugins.py:Toy", params: {fail: "no"}}', "plugins.py:Seeing"))
     study = load_study(config)
     grid, store = planning.plan(study), Store(tmp_path / "out")
@@ -72,13 +70,11 @@ def test_a_preview_counts_what_is_done_and_what_it_would_take(tmp_path: Path) ->
     assert all(row.seconds is not None and row.seconds > 0 for row in elsewhere[1:])
 
 
-def test_a_preview_counts_photographs_as_the_board_does(tmp_path: Path) -> None:
+def test_a_preview_counts_photographs_as_the_board_does(tmp_path):
     watching = "{name: online_camera, captures: 9, params: {captures: 12}}"
     study = load_study(write_config(tmp_path, ("wirtinger", watching, "hil", "hil_plus")))
-    learning = [
-        TrainingRow("hil-a", ("hil",), "done", 62, 1.0),
-        TrainingRow("hil_plus-a", ("hil_plus",), "unfinished", 5, 1.0),
-    ]
+    states = (("hil", "done", 62), ("hil_plus", "unfinished", 5))
+    learning = [TrainingRow(f"{name}-a", (name,), state, taken, 1.0) for name, state, taken in states]
     rows = preview(study, planning.plan(study), Store(tmp_path), threads=1, workers=1, learning=learning)
     targets = len(study.items)
     assert [row.photographs for row in rows[:4]] == [None, 0, 9 * targets, 62]
@@ -96,7 +92,7 @@ def printed(study: Study, rows: list[Row], width: int = 160) -> str:
 UNTIMED = Row("c", 1, 2, 4, 50, 0, 0, 4, None)
 
 
-def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_any_is_known(tmp_path: Path) -> None:
+def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_any_is_known(tmp_path):
     study = load_study(write_config(tmp_path))
     text = printed(study, [Row("a[b]", 1, 2, 30, None, 10, 0, 20, 1.5), UNTIMED])
     assert all(word in text for word in ("a[b]", "34", "24", "at least 1.5", "50", "not timed", "solving"))
@@ -105,7 +101,7 @@ def test_the_table_of_a_preview_shows_sums_and_brackets_floors_and_times_where_a
     assert all(words in text for words in ("floor images, no method", "all, 18 of them floors"))
 
 
-def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path: Path) -> None:
+def test_the_table_of_a_preview_fits_80_columns_without_cutting_a_number(tmp_path):
     rows = [
         Row("online_camera_network", 3, 28, 1234, 2800, 1000, 12, 1222, 12345.0),
         Row("x" * 60, 3, 28, 84, None, 0, 0, 84, None),
@@ -126,37 +122,33 @@ def bar(task: planning.Task, is_whole: bool) -> str:
     return text.getvalue()
 
 
-def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task: planning.Task) -> None:
-    now, left, lines = [0.0], [None, 90.0], list[str]()
+def test_lines_and_bar_show_the_time_left_of_the_run_or_its_lower_limit(task):
+    now, lines = [0.0], list[str]()
     watch = Lines(lines.append, clock=lambda: now[0])
     watch.planned(2, 2, 0)
-    watch.expects(lambda: left[0])
-    for _ in range(2):
-        now[0] += 10
-        watch.started(task)
-        left.pop(0) if len(left) > 1 else None
-    assert ["left" in line for line in lines[1:]] == [False, True]
-    assert ", about 90 s left; now" in lines[-1]
-    for seconds, said in ((90.0, ", at least 90 s left; now"), (0.2, "")):  # a lower limit of nothing is not said
-        watch.expects(lambda: seconds, lambda: False)  # noqa: B023
+    for seconds, is_whole, said in (
+        *((None, True, ""), (90.0, True, ", about 90 s left; now"), (90.0, False, ", at least 90 s left; now")),
+        (0.2, False, ""),  # a lower limit of nothing is not said
+    ):
+        watch.expects(lambda: seconds, lambda: is_whole)  # noqa: B023
         now[0] += 10
         watch.started(task)
         assert said in lines[-1]
         assert ("left" in lines[-1]) == bool(said)
-    assert "about 90 s" in bar(task, True)
-    assert "at least" not in bar(task, True)
-    assert "at least 90 s" in bar(task, False)
+    whole, lowest = bar(task, True), bar(task, False)
+    assert "about 90 s" in whole
+    assert "at least" not in whole
+    assert "at least 90 s" in lowest
 
 
 @pytest.mark.parametrize(
     ("seconds", "words"), [(0.25, "0.25 s"), (9.4, "9.4 s"), (99.4, "99 s"), (1351, "23 min"), (12_600, "3.5 h")]
 )
-def test_a_time_is_said_in_the_unit_that_people_would_use(seconds: float, words: str) -> None:
+def test_a_time_is_said_in_the_unit_that_people_would_use(seconds, words):
     assert duration(seconds) == words
 
 
-@pytest.mark.usefixtures("no_physics")
-def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path: Path) -> None:
+def test_a_run_says_what_is_left_and_a_single_worker_tries_every_method_before_it_repeats_one(tmp_path):
     study = load_study(write_config(tmp_path, ("plugins.py:Toy", "plugins.py:Seeing")))
     left, started = list[float | None](), list[str]()
 

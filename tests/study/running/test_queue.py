@@ -1,8 +1,5 @@
 """The order in which trainings and cells are taken up."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -62,7 +59,7 @@ class Executor:
         return left
 
 
-def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_right_after_the_trainings_without_any() -> None:
+def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_right_after_the_trainings_without_any():
     executor = Executor(TRAININGS, JOBS)
     assert [executor.take() for _ in range(4)] == [*TRAININGS, JOBS[1], None]
     executor.end(TRAININGS[1])
@@ -71,11 +68,11 @@ def test_a_cell_comes_as_soon_as_all_that_it_needs_is_learned_and_right_after_th
     assert executor.rest() == [JOBS[0], JOBS[3]]
 
 
-def test_without_trainings_cells_keep_the_order_of_the_plan() -> None:
+def test_without_trainings_cells_keep_the_order_of_the_plan():
     assert Executor([], JOBS).rest() == JOBS
 
 
-def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work() -> None:
+def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work():
     first, other, last = jobs = [FakeJob("x", ("one",), alone=True), FakeJob("a"), FakeJob("y", alone=True)]
     executor = Executor(TRAININGS[:1], jobs)
     assert [executor.take() for _ in range(3)] == [TRAININGS[0], other, None]
@@ -88,7 +85,7 @@ def test_a_job_that_is_to_be_alone_comes_last_and_only_when_nothing_is_at_work()
 
 
 @pytest.fixture
-def lasts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+def lasts(monkeypatch):
     """Takes a job of an executor, which ends after some seconds."""
     clock = [0.0]
     monkeypatch.setattr("time.monotonic", lambda: clock[0])
@@ -102,7 +99,7 @@ def lasts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     return lasts
 
 
-def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(lasts: Callable[..., Any]) -> None:
+def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(lasts):
     labels = ("short 1", "short 2", "short 3", "long 1", "long 2", "long 3", "new 1")
     jobs: Any = [FakeJob(label) for label in labels]
     executor = Executor([], jobs)
@@ -111,7 +108,7 @@ def test_the_longest_job_comes_first_and_before_it_those_of_unknown_length(lasts
     assert executor.rest() == [jobs[1], jobs[2], jobs[5]]
 
 
-def test_quick_jobs_of_all_labels_go_target_by_target(lasts: Callable[..., Any]) -> None:
+def test_quick_jobs_of_all_labels_go_target_by_target(lasts):
     labels = [f"{label} {target}" for label in ("quick", "long", "quicker") for target in range(3)]
     jobs = {label: FakeJob(label) for label in labels}
     executor = Executor([], list(jobs.values()))
@@ -120,7 +117,7 @@ def test_quick_jobs_of_all_labels_go_target_by_target(lasts: Callable[..., Any])
     assert executor.rest() == [jobs[label] for label in order]
 
 
-def test_a_drawing_comes_before_the_jobs_that_are_shorter(lasts: Callable[..., Any]) -> None:
+def test_a_drawing_comes_before_the_jobs_that_are_shorter(lasts):
     jobs: Any = [FakeJob("long 1"), FakeJob("short 1"), FakeJob("long 2"), FakeJob("short 2")]
     drawing: Any = FakeTraining("drawing")
     executor = Executor([], jobs, drawings=[drawing])
@@ -128,7 +125,7 @@ def test_a_drawing_comes_before_the_jobs_that_are_shorter(lasts: Callable[..., A
     assert executor.rest() == [jobs[2], drawing, jobs[3]]
 
 
-def test_a_job_that_starts_from_others_waits_for_them() -> None:
+def test_a_job_that_starts_from_others_waits_for_them():
     oracle, a, b = jobs = [FakeJob("oracle", starts=("a", "b")), FakeJob("a"), FakeJob("b")]
     executor = Executor([], jobs, {"a", "b", "oracle"})
     assert [executor.take() for _ in range(3)] == [a, b, None]
@@ -138,6 +135,6 @@ def test_a_job_that_starts_from_others_waits_for_them() -> None:
     assert executor.rest() == [oracle]
 
 
-def test_a_job_that_starts_from_one_that_runs_alone_comes_after_it() -> None:
+def test_a_job_that_starts_from_one_that_runs_alone_comes_after_it():
     jobs: Any = [FakeJob("oracle", starts=("a",)), FakeJob("a", alone=True), FakeJob("b")]
     assert Executor([], jobs, {"a", "oracle"}).rest() == [jobs[2], jobs[1], jobs[0]]

@@ -1,10 +1,7 @@
 """A metric that comes later costs a column: captures are scored again, and nothing is solved or photographed."""
 
-from __future__ import annotations
-
 import shutil
 from collections import Counter
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,13 +14,14 @@ from holobench_eval.report.data.tables import difference
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.phases import phases_of
-from holobench_eval.study.plan import Cell, plan
+from holobench_eval.study.plan import Cell
 from holobench_eval.study.running import provenance
 from holobench_eval.study.running.run import Outcome
 from holobench_eval.study.store import Store
-from tests.support import another_metric, trained_study
-from tests.support.another_metric import COLUMN, NAME
-from tests.support.trained_study import compute
+from tests.study.studies import exchanged, planned
+from tests.support.studies import another_metric, trained_study
+from tests.support.studies.another_metric import COLUMN, NAME
+from tests.support.studies.trained_study import compute
 
 ONE, BOTH = "protocol: {metrics: [psnr]}", f"protocol: {{metrics: [psnr, {NAME}]}}"
 PICTURE = f"""\
@@ -34,37 +32,33 @@ display: {{profiles: [leto-mild], panel: [128, 128]}}
 targets: {{dataset: charts, params: {{names: [tv_lines, gray_ramp]}}}}
 methods: [double_phase]
 """
-FOCUS = (
-    PICTURE.replace("seed: 3", "seed: 3\nmeasure: focus\nheadline: psnr_linear_infocus")
-    .replace("charts, params: {names: [tv_lines, gray_ramp]}", "focal_stacks, params: {planes: [0, 1.5], blur: 0.03}")
-    .replace(
-        "[double_phase]", "[{name: multi_plane, params: {iterations: 2}}, {name: wirtinger, params: {iterations: 2}}]"
-    )
+TARGETS = "charts, params: {names: [tv_lines, gray_ramp]}"
+FOCUS = exchanged(
+    PICTURE,
+    ("seed: 3", "seed: 3\nmeasure: focus\nheadline: psnr_linear_infocus"),
+    (TARGETS, "focal_stacks, params: {planes: [0, 1.5], blur: 0.03}"),
+    ("[double_phase]", "[{name: multi_plane, params: {iterations: 2}}, {name: wirtinger, params: {iterations: 2}}]"),
 )
-PREDICTION = (
-    PICTURE.replace("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 2}}")
-    .replace("charts, params: {names: [tv_lines, gray_ramp]}", '"trained.py:Pictures", params: {count: 2}')
-    .replace("[double_phase]", '["trained.py:Even"]')
+PREDICTION = exchanged(
+    PICTURE,
+    ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 2}}"),
+    (TARGETS, '"trained.py:Pictures", params: {count: 2}'),
+    ("[double_phase]", '["trained.py:Even"]'),
 )
 MEASURES = {"picture": PICTURE, "focus": FOCUS, "prediction": PREDICTION}
 
 
 @pytest.fixture
-def done(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+def done(monkeypatch):
     """How often a method was at work, and how many photographs were taken for a score."""
     count: Counter[str] = Counter()
-    start, photograph = cost.Stopwatch, CalibratedBench.photograph
 
-    def started(*args: Any, **named: Any) -> Any:
-        count["solved"] += 1
-        return start(*args, **named)
+    def counted(where: Any, name: str, what: str) -> None:
+        function = getattr(where, name)
+        monkeypatch.setattr(where, name, lambda *args, **named: count.update([what]) or function(*args, **named))
 
-    def photographed(*args: Any, **named: Any) -> Any:
-        count["photographed"] += 1
-        return photograph(*args, **named)
-
-    monkeypatch.setattr(cost, "Stopwatch", started)
-    monkeypatch.setattr(CalibratedBench, "photograph", photographed)
+    counted(cost, "Stopwatch", "solved")
+    counted(CalibratedBench, "photograph", "photographed")
     return count
 
 
@@ -76,7 +70,7 @@ def written(folder: Path, text: str = PICTURE, metrics: str = ONE) -> Path:
 
 
 @pytest.fixture(scope="module")
-def base(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def base(tmp_path_factory):
     """Gives the folder of a study that was computed once, which no test changes."""
 
     @cache
@@ -91,9 +85,7 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def study(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: Callable[..., Path], done: Counter[str]
-) -> Callable[..., Path]:
+def study(tmp_path, monkeypatch, base, done):
     """Gives the config of a study that was computed by a metric less than it names now."""
     another_metric.add(tmp_path, monkeypatch)
 
@@ -106,12 +98,12 @@ def study(
 
 
 @pytest.fixture
-def fresh(base: Callable[..., Path]) -> Callable[[str], list[dict[str, Any]]]:
+def fresh(base):
     """Gives the records of a study that was computed by both metrics at once."""
 
     def records(measure: str = "picture") -> list[dict[str, Any]]:
         folder = base(measure, BOTH)
-        return measured(Store(folder / "out").load(plan(load_study(folder / "study.yaml"))))
+        return measured(Store(folder / "out").load(planned(folder / "study.yaml")))
 
     return records
 
@@ -124,12 +116,12 @@ def measured(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def cells(config: Path) -> list[Cell]:
     """The cells that have a method."""
-    return [cell for cell in plan(load_study(config)).cells if cell.code]
+    return [cell for cell in planned(config).cells if cell.code]
 
 
 def forget(config: Path, captures: bool = True, phases: bool = True) -> None:
     """Delete what a run in the folder ``out`` has kept."""
-    kept, every = Store(config.parent / "out"), plan(load_study(config)).cells
+    kept, every = Store(config.parent / "out"), planned(config).cells
     for cell in every if captures else ():
         kept.capture(cell.id).unlink(missing_ok=True)
     for file in phases_of(config.parent / "out").folder.iterdir() if phases else ():
@@ -140,16 +132,10 @@ def column(outcome: Outcome, name: str = COLUMN) -> list[float | None]:
     return [record["scores"].get(name) for record in outcome.records]
 
 
-Study = Callable[..., Path]
-Fresh = Callable[..., list[dict[str, Any]]]
-
-
 @pytest.mark.parametrize("measure", MEASURES)
-def test_a_new_metric_has_the_digits_of_a_fresh_run(
-    study: Study, fresh: Fresh, done: Counter[str], measure: str
-) -> None:
+def test_a_new_metric_has_the_digits_of_a_fresh_run(study, fresh, done, measure):
     config = study(measure)
-    grid, store = plan(load_study(config)), Store(config.parent / "out")
+    grid, store = planned(config), Store(config.parent / "out")
     before = store.load(grid)
     frame = records_frame(before, layout_of(load_study(config)))
     assert difference(frame, grid) == ""
@@ -167,9 +153,9 @@ def untold(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**record, "scores": None} for record in records]
 
 
-def test_a_run_fills_the_column_too_and_solves_nothing(study: Study, done: Counter[str]) -> None:
+def test_a_run_fills_the_column_too_and_solves_nothing(study, done):
     config = study()
-    grid = plan(load_study(config))
+    grid = planned(config)
     first = [record["scores"]["psnr_linear"] for record in Store(config.parent / "out").load(grid)]
     outcome = compute(config)
     assert done == {}
@@ -179,9 +165,9 @@ def test_a_run_fills_the_column_too_and_solves_nothing(study: Study, done: Count
     assert provenance.read(config.parent / "out")["scores"] == grid.metrics
 
 
-def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study: Study) -> None:
+def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(study):
     config = study(metrics=BOTH.replace("psnr,", "psnr, gmsd,"))
-    before = Store(config.parent / "out").load(plan(load_study(config)))
+    before = Store(config.parent / "out").load(planned(config))
     outcome = compute(config, rescore=(NAME,))  # from captures
     assert None not in column(outcome, "psnr_linear") + column(outcome)
     assert None in column(outcome, "gmsd_srgb")
@@ -192,7 +178,7 @@ def test_only_the_metrics_that_are_asked_for_are_filled_and_no_score_is_lost(stu
 
 
 @pytest.mark.parametrize("measure", ["picture", "focus"])
-def test_phases_are_shown_again_to_the_same_bits(study: Study, fresh: Fresh, done: Counter[str], measure: str) -> None:
+def test_phases_are_shown_again_to_the_same_bits(study, fresh, done, measure):
     config = study(measure)
     store, every = Store(config.parent / "out"), cells(config)
     before = [store.capture(cell.id).read_bytes() for cell in every]
@@ -205,9 +191,7 @@ def test_phases_are_shown_again_to_the_same_bits(study: Study, fresh: Fresh, don
 
 
 @pytest.mark.parametrize("measure", MEASURES)
-def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(
-    study: Study, fresh: Fresh, done: Counter[str], measure: str
-) -> None:
+def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(study, fresh, done, measure):
     config = study(measure)
     forget(config)
     again = compute(config, rescore=(NAME,))
@@ -220,7 +204,7 @@ def test_a_hole_of_which_nothing_is_kept_waits_for_a_run(
     assert measured(whole.records) == fresh(measure)
 
 
-def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: Study, done: Counter[str]) -> None:
+def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study, done):
     config = study()
     config.write_text(f"{config.read_text()}save: {{kept: false}}\n")
     forget(config, phases=False)
@@ -231,7 +215,7 @@ def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study: S
 
 
 @pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file"])
-def test_the_phase_of_a_damaged_capture_is_photographed_again(study: Study, done: Counter[str], damage: str) -> None:
+def test_the_phase_of_a_damaged_capture_is_photographed_again(study, done, damage):
     config = study()
     file = Store(config.parent / "out").capture(cells(config)[0].id)
     content = file.read_bytes()
@@ -249,7 +233,7 @@ def test_the_phase_of_a_damaged_capture_is_photographed_again(study: Study, done
     assert None not in column(again)
 
 
-def test_records_are_those_of_another_study_only_where_the_captures_are(study: Study) -> None:
+def test_records_are_those_of_another_study_only_where_the_captures_are(study):
     config = study(metrics=ONE)
     config.write_text(config.read_text().replace("seed: 3", "seed: 4"))
     again = compute(config, rescore=("psnr",))

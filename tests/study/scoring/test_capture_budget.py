@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -7,70 +5,13 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import plan
-from tests.study.studies import compute
-from tests.support.fake_study import write_config
+from tests.study.studies import compute, planned
+from tests.support import plugins
+from tests.support.studies.fake_study import write_config
 
 pytestmark = pytest.mark.usefixtures("no_physics")
 
-METHODS = """
-from dataclasses import dataclass
-from typing import ClassVar
-
-import torch
-from holobench_eval.core.errors import BudgetError
-
-
-@dataclass(frozen=True)
-class Method:
-    keeps: bool = True
-    camera: ClassVar[bool] = True
-
-    def phase(self, target, bench):
-        return torch.full((*target.shape[:2], *bench.spec.shape), 2.0)
-
-
-class Greedy(Method):
-    \"\"\"Captures for ever; hands in its phase first, and other ones never.\"\"\"
-
-    def solve(self, target, bench):
-        phase = self.phase(target, bench)[0]
-        if self.keeps:
-            bench.keep(phase)
-        while True:
-            bench.capture(phase)
-            phase.fill_(9.0)  # what was handed in is a copy
-
-
-class Modest(Method):
-    \"\"\"Takes as many captures as it may, and no more.\"\"\"
-
-    def solve(self, target, bench):
-        for _ in range(bench.budget or 1):
-            bench.capture(self.phase(target, bench)[0])
-        return self.phase(target, bench)
-
-
-class Deaf(Method):
-    \"\"\"Goes on after the display has ended it, and returns another phase than it has handed in.\"\"\"
-
-    def solve(self, target, bench):
-        phase = self.phase(target, bench)
-        bench.keep(phase)
-        try:
-            while True:
-                bench.capture(phase[0])
-        except Exception:
-            return phase.fill_(9.0)
-
-
-class Lying(Method):
-    \"\"\"Says of itself that the display has ended it.\"\"\"
-
-    def solve(self, target, bench):
-        bench.keep(self.phase(target, bench)[0])
-        raise BudgetError("the best of all methods")
-"""
+METHODS = plugins.text("budgets")
 
 
 def study_of(folder: Path, *methods: str) -> Path:
@@ -78,23 +19,22 @@ def study_of(folder: Path, *methods: str) -> Path:
     return write_config(folder, tuple(f"{{name: camera.py:{method}}}" for method in methods), count=1)
 
 
-def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path: Path) -> None:
-    methods = [f"{name}, captures: 3" for name in ("Greedy", "Deaf", "Modest")]
-    config = study_of(tmp_path, *methods, "Greedy, label: none, captures: 2, params: {keeps: false}", "Lying")
+def test_a_method_over_its_budget_is_stopped_by_the_display_and_its_best_hologram_is_scored(tmp_path):
+    methods = [f"{name}, captures: 3" for name in ("greedy", "deaf", "modest")]
+    config = study_of(tmp_path, *methods, "greedy, label: none, captures: 2, params: {keeps: false}", "lying")
     found = compute(config, tmp_path / "out").records
     greedy, deaf, modest, none, lying = (record for record in found if record["cell"]["condition"] != "reference")
     for stopped in (greedy, deaf):
         assert (stopped["state"], stopped["captures"], stopped["scores"]) == ("done", 3, modest["scores"])
         assert stopped["stopped"] == f"{stopped['label']} has used its 3 captures"
-    assert (modest["captures"], modest["stopped"]) == (3, "")
-    assert none["state"] == "failed"
+    assert (modest["captures"], modest["stopped"], none["state"]) == (3, "", "failed")
     assert none["reason"].startswith("none has used its 2 captures and kept no phase")
     assert (lying["state"], lying.get("stopped", "")) == ("failed", "")
 
 
-def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path: Path) -> None:
-    many = ("Modest", "Modest, label: two, captures: 2", "Modest, label: three, captures: 3")
-    tasks = [task for task in plan(load_study(study_of(tmp_path, *many))).tasks if not task.is_floor]
+def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_as_it_was(tmp_path):
+    many = ("modest", "modest, label: two, captures: 2", "modest, label: three, captures: 3")
+    tasks = [task for task in planned(study_of(tmp_path, *many)).tasks if not task.is_floor]
     free, two, _ = (task.cells[0] for task in tasks)
     assert "captures" not in free.phase
     assert two.phase == {**free.phase, "captures": 2}
@@ -106,11 +46,11 @@ def test_a_budget_makes_another_phase_and_another_time_and_none_leaves_its_name_
     ("method", "message"),
     [
         ('"plugins.py:Toy", captures: 3', r":6:\d+: .*plugins.py:Toy' takes no captures .*remove 'captures'"),
-        ("camera.py:Modest, captures: 0", r":6:\d+: .*captures"),
-        ("camera.py:Modest, captures: many", r":6:\d+: .*captures"),
+        ("camera.py:modest, captures: 0", r":6:\d+: .*captures"),
+        ("camera.py:modest, captures: many", r":6:\d+: .*captures"),
     ],
 )
-def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path: Path, method: str, message: str) -> None:
+def test_a_budget_that_means_nothing_is_refused_in_its_place(tmp_path, method, message):
     (tmp_path / "camera.py").write_text(METHODS)
     with pytest.raises(UserError, match=message):
         load_study(write_config(tmp_path, (f"{{name: {method}}}",), count=1))

@@ -1,20 +1,17 @@
 """Focal stacks: what is planned, what is shown where, and what is scored."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
 
 import pytest
 import torch
 
 from holobench_eval.core.errors import CellError
 from holobench_eval.metrics import score
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import REFERENCE, plan
+from holobench_eval.study.plan import REFERENCE
 from holobench_eval.study.scoring.scores import in_focus
-from tests.study.studies import assert_refused, exchanged, tasks_of
-from tests.support.trained_study import compute, computed
+from tests.study.studies import assert_refused, exchanged, planned, tasks_of
+from tests.support import plugins
+from tests.support.studies.trained_study import compute, computed
 
 CONFIG = """\
 title: "Depth"
@@ -29,23 +26,7 @@ headline: psnr_linear_infocus
 protocol: {metrics: [psnr, ssim]}
 """
 
-MIDDLE = '''
-from dataclasses import dataclass
-from typing import ClassVar
-
-from holobench_eval.methods.wirtinger import Wirtinger
-
-
-@dataclass(frozen=True)
-class Middle(Wirtinger):
-    """One hologram for all planes that knows the middle one alone."""
-
-    planes: ClassVar[bool] = True
-
-    def solve_planes(self, targets, offsets, bench):
-        assert offsets[1] == 0
-        return self.solve(targets[1:2], bench)[0]
-'''
+MIDDLE = plugins.text("middle")
 
 
 def write(folder: Path, *changes: tuple[str, str]) -> Path:
@@ -59,23 +40,23 @@ TWO_SCENES = ("{planes:", "{scenes: [shapes, shapes-2], planes:")
 TWO_DISPLAYS = ("[ideal]", "[leto-mild, leto-aged]")
 
 
-def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path: Path) -> None:
+def test_most_methods_solve_every_picture_and_one_of_planes_every_scene(tmp_path):
     tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     assert [len(task.cells) for task in tasks["wirtinger"]] == [2] * 6
     assert [len(task.cells) for task in tasks["multi_plane"]] == [6] * 2
 
 
-def test_cells_carry_the_display_and_where_the_camera_is(tmp_path: Path) -> None:
+def test_cells_carry_the_display_and_where_the_camera_is(tmp_path):
     tasks = tasks_of(write(tmp_path))
     lens = {task.cells[0].target: dict(task.cells[0].change) for task in tasks["wirtinger"]}
     assert lens == {"shapes@-1.5mm": {"refocus": -1.5}, "shapes@0mm": {}, "shapes@1.5mm": {"refocus": 1.5}}
     (stack,) = tasks["multi_plane"]
     assert [dict(cell.change) for cell in stack.cells] == [{"other_plane": -1.5}, {}, {"other_plane": 1.5}]
     assert {cell.condition for cell in stack.cells} == {"ideal"}
-    assert "infocus" in plan(load_study(tmp_path / "study.yaml")).metrics
+    assert "infocus" in planned(tmp_path / "study.yaml").metrics
 
 
-def test_the_wrong_target_is_another_scene(tmp_path: Path) -> None:
+def test_the_wrong_target_is_another_scene(tmp_path):
     wrong = {
         cell.target: cell.params["target"]
         for task in tasks_of(write(tmp_path, TWO_SCENES))["floor"]
@@ -88,17 +69,14 @@ def test_the_wrong_target_is_another_scene(tmp_path: Path) -> None:
     assert "floor_wrong_target" not in alone
 
 
-Records = dict[tuple[str, str], dict[str, Any]]
-
-
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> Records:
+def records(tmp_path_factory):
     """The records of a study on a real bench, by label and target."""
     found = computed(write(tmp_path_factory.mktemp("focus")))
     return {(record["label"], record["cell"]["target"]): record for record in found}
 
 
-def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records: Records, tmp_path: Path) -> None:
+def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records, tmp_path):
     alone = CONFIG[CONFIG.index("  - {name: multi") : CONFIG.index("headline")]
     config = write(tmp_path, ("measure: focus\n", ""), ("psnr_linear_infocus", "psnr_linear"), (alone, ""))
     pictures = {(r["label"], r["cell"]["target"]): r["scores"] for r in compute(config).records}
@@ -108,34 +86,24 @@ def test_the_plane_of_the_display_scores_what_a_plain_picture_scores(records: Re
     assert set(found) - set(plain) == {"psnr_linear_infocus", "ssim_linear_infocus"}
 
 
-def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(records: Records) -> None:
+def test_a_hologram_of_all_planes_is_better_at_every_other_plane_than_one_of_the_middle(records):
     for target in ("shapes@-1.5mm", "shapes@1.5mm"):
-        joint, middle = (records[label, target]["scores"] for label in ("multi_plane", "Middle"))
+        joint, moved, middle = (records[label, target]["scores"] for label in ("multi_plane", "wirtinger", "Middle"))
         for name in ("psnr_linear", "psnr_linear_infocus"):
             assert joint[name] > middle[name] + 1
+        assert moved["psnr_linear"] > middle["psnr_linear"] + 3  # by a lens, more than the camera loses without one
 
 
-def test_a_lens_keeps_more_than_the_camera_loses_without_one(records: Records) -> None:
-    for target in ("shapes@-1.5mm", "shapes@1.5mm"):
-        moved, stayed = (records[label, target]["scores"] for label in ("wirtinger", "Middle"))
-        assert moved["psnr_linear"] > stayed["psnr_linear"] + 3
+def test_planes_of_a_scene_share_the_time_of_a_hologram_and_the_floor_is_scored_in_focus_too(records):
+    floor = records["floor_constant", "shapes@0mm"]
+    assert len({record["seconds"] for (label, _), record in records.items() if label == "multi_plane"}) == 1
+    assert floor["scores"]["psnr_linear_infocus"] < 25
+    assert floor["cell"]["condition"] == REFERENCE
 
 
-def test_planes_of_a_scene_share_the_time_of_a_hologram_and_the_floor_is_scored_in_focus_too(records: Records) -> None:
-    targets = ("shapes@-1.5mm", "shapes@0mm", "shapes@1.5mm")
-    assert len({records["multi_plane", target]["seconds"] for target in targets}) == 1
-    assert records["floor_constant", "shapes@0mm"]["scores"]["psnr_linear_infocus"] < 25
-    assert records["floor_constant", "shapes@0mm"]["cell"]["condition"] == REFERENCE
-
-
-def pictures() -> tuple[torch.Tensor, torch.Tensor]:
-    draw = torch.Generator().manual_seed(3)
-    wanted = torch.rand(3, 40, 48, generator=draw)
-    return 3 * (wanted + 0.1 * torch.rand(3, 40, 48, generator=draw)), wanted
-
-
-def test_only_errors_in_focus_count_and_those_of_the_whole_picture_where_all_is() -> None:
-    image, wanted = pictures()
+def test_only_errors_in_focus_count_and_those_of_the_whole_picture_where_all_is():
+    wanted, noise = torch.rand(2, 3, 40, 48, generator=torch.Generator().manual_seed(3))
+    image = 3 * (wanted + 0.1 * noise)
     plain = score(image, wanted, metrics=["psnr", "ssim"])
     found = in_focus(image, wanted, torch.ones(40, 48, dtype=torch.bool))
     assert found == pytest.approx({f"{name}_infocus": plain[name] for name in ("psnr_linear", "ssim_linear")}, abs=1e-9)
@@ -160,5 +128,5 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("change", "message"), REFUSED)
-def test_what_has_no_planes_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+def test_what_has_no_planes_is_refused_at_its_place(tmp_path, change, message):
     assert_refused(write(tmp_path, change), message)

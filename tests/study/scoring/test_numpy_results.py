@@ -1,7 +1,5 @@
 """A method may give NumPy's arrays: each scores to the last digit what the tensor of the same numbers scores."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -11,43 +9,10 @@ import torch
 
 from holobench_eval.display.phases import from_numpy
 from tests.study.studies import write_study
-from tests.support.trained_study import compute
+from tests.support import plugins
+from tests.support.studies.trained_study import compute
 
-METHODS = """
-from dataclasses import dataclass
-
-import numpy as np
-import torch
-
-
-@dataclass(frozen=True)
-class Tensors:
-    double: bool = False
-
-    def solve(self, target, bench):
-        phase = 6 * torch.rand((*target.shape[:2], *bench.spec.shape), generator=bench.generator("start"))
-        return phase.double() / 3 if self.double else phase
-
-    def predict(self, phase, bench):
-        return torch.rand((*phase.shape[:2], *bench.spec.region.shape), generator=bench.generator("light"))
-
-
-@dataclass(frozen=True)
-class Arrays(Tensors):
-    def solve(self, target, bench):
-        return np.asfortranarray(super().solve(target, bench).numpy())
-
-    def predict(self, phase, bench):
-        return super().predict(phase, bench).numpy()[..., ::-1][..., ::-1]
-
-
-def array(target, bench):
-    return Arrays().solve(target, bench)
-
-
-def levels(target, bench):
-    return np.zeros((*target.shape[:2], *bench.spec.shape), np.uint8)
-"""
+METHODS = plugins.text("arrays")
 
 EXPECTED = "expected tensors, numbers, text, lists or mappings of them"
 REFUSED = {
@@ -69,10 +34,9 @@ def named(label: str, name: str, params: str = "{}") -> str:
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path: Path, isolation: str) -> None:
-    double = "{double: true}"
+def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path, isolation):
     methods = [named("t", "Tensors"), named("a", "Arrays"), named("function", "array"), named("levels", "levels")]
-    methods += [named("t64", "Tensors", double), named("a64", "Arrays", double)]
+    methods += [named(f"{name[0].lower()}64", name, "{double: true}") for name in ("Tensors", "Arrays")]
     found = records(tmp_path, isolation, *methods)
     levels = found.pop("levels")
     assert (levels["state"], levels["reason"]) == ("failed", REFUSED[isolation].format("levels"))
@@ -82,7 +46,7 @@ def test_a_phase_scores_what_its_tensor_scores_and_levels_are_none(tmp_path: Pat
 
 
 @pytest.mark.parametrize("isolation", ["none", "files"])
-def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path, isolation: str) -> None:
+def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path, isolation):
     found = {}
     for shown in ("Tensors", "Arrays", "levels"):
         predicted, shown_by = (named("t", "Tensors"), named("a", "Arrays")), f"{{name: 'mine.py:{shown}'}}"
@@ -95,7 +59,7 @@ def test_holograms_and_predictions_score_what_their_tensors_score(tmp_path: Path
 
 
 @pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
-def test_real_numbers_become_a_tensor_of_its_own_memory(dtype: str) -> None:
+def test_real_numbers_become_a_tensor_of_its_own_memory(dtype):
     array = np.arange(24, dtype=dtype).reshape(2, 3, 4)[:, ::-1].transpose(2, 0, 1)
     array.flags.writeable = False
     tensor = from_numpy(array)
@@ -109,5 +73,5 @@ OTHER = [np.zeros(2, np.float16), np.zeros(2, np.complex64), np.zeros(2, np.uint
 
 
 @pytest.mark.parametrize("value", [*OTHER, np.float32(1), torch.zeros(2), [1.0], None])
-def test_all_else_stays_as_it_is(value: Any) -> None:
+def test_all_else_stays_as_it_is(value):
     assert from_numpy(value) is value

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections import OrderedDict
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,33 +6,31 @@ from typing import Any
 import pytest
 
 from holobench_eval.study import cost
-from holobench_eval.study.config import load_study
-from holobench_eval.study.plan import plan
 from holobench_eval.study.scoring import prediction as predicting
-from tests.study.studies import assert_refused
-from tests.support.trained_study import compute, computed, write
+from tests.study.studies import assert_refused, planned
+from tests.support.studies.trained_study import compute, computed, write
 
 PREDICTION = ("seed: 3", "seed: 3\nmeasure: prediction\nholograms: {params: {iterations: 3}}")
 METHODS = ('["trained.py:Gain"]', '["trained.py:Gain", "trained.py:Even"]')
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+def records(tmp_path_factory):
     """The records of a prediction study on a real bench, by label."""
     folder = tmp_path_factory.mktemp("prediction")
     config = write(folder, PREDICTION, METHODS, ("count: 1", "count: 2"))
     return {record["label"]: record for record in computed(config) if record["cell"]["target"] == "picture 0"}
 
 
-def test_the_ideal_image_predicts_the_capture_of_an_ideal_display(records: dict[str, dict[str, Any]]) -> None:
+def test_the_ideal_image_predicts_the_capture_of_an_ideal_display(records):
     scores = records["Gain"]["scores"]
     assert scores["psnr_linear"] > 30
     assert scores["ssim_linear"] > 0.9
     assert records["Gain"]["learned"]["captures"] == 2
-    assert all(abs(scores[f"scale_{channel}"] - 1) < 0.1 for channel in range(3))
+    assert [scores[f"scale_{channel}"] for channel in range(3)] == pytest.approx([1] * 3, abs=0.1)
 
 
-def test_even_light_scores_what_the_floor_says_of_the_same_capture(records: dict[str, dict[str, Any]]) -> None:
+def test_even_light_scores_what_the_floor_says_of_the_same_capture(records):
     even, floor = records["Even"]["scores"], records["floor_constant"]["scores"]
     for name in ("psnr_linear", "ssim_linear", "psnr_srgb"):
         assert even[name] == pytest.approx(floor[name], abs=1e-4)
@@ -42,25 +38,21 @@ def test_even_light_scores_what_the_floor_says_of_the_same_capture(records: dict
     assert records["Gain"]["scores"]["psnr_linear"] > floor["psnr_linear"] + 5
 
 
-def test_the_floor_compares_with_the_capture_not_the_target(records: dict[str, dict[str, Any]], tmp_path: Path) -> None:
+def test_the_floor_compares_with_the_capture_not_the_target_and_the_wrong_target_is_another_capture(records, tmp_path):
     pictures = compute(write(tmp_path, ('["trained.py:Gain"]', '["trained.py:Even"]'))).records
     floor = {record["label"]: record["scores"] for record in pictures}
     for name in ("floor_black", "floor_shift_1px"):
         assert records[name]["scores"]["psnr_linear"] != pytest.approx(floor[name]["psnr_linear"], abs=1e-3)
-
-
-def test_the_wrong_target_of_the_floor_is_the_capture_of_another_hologram(records: dict[str, dict[str, Any]]) -> None:
     assert records["floor_wrong_target"]["scores"]["psnr_linear"] < 40  # 80 dB where it is the same capture
 
 
-def test_cells_of_predictions_name_the_hologram_and_are_no_cells_of_pictures(tmp_path: Path) -> None:
+def test_cells_of_predictions_name_the_hologram_and_are_no_cells_of_pictures(tmp_path):
     other = PREDICTION[0], PREDICTION[1].replace("3}", "4}")
-    grids = [plan(load_study(write(tmp_path, *change))) for change in ((), (PREDICTION,), (other,))]
+    grids = [planned(write(tmp_path, *change)) for change in ((), (PREDICTION,), (other,))]
     pictures, cells, others = (grid.cells for grid in grids)
     assert cost.key(grids[0].tasks[-1], 1, 1) != cost.key(grids[1].tasks[-1], 1, 1)  # nor is the time the same
     assert len({cell.id for cell in (*pictures, *cells, *others)}) == len(pictures) + len(cells) + len(others)
-    assert cells[-1].holograms["name"] == "wirtinger"
-    assert cells[-1].holograms["params"]["iterations"] == 3
+    assert (cells[-1].holograms["name"], cells[-1].holograms["params"]["iterations"]) == ("wirtinger", 3)
 
 
 REFUSED = [
@@ -71,12 +63,12 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("line", "methods", "message"), REFUSED)
-def test_what_cannot_be_predicted_is_refused_in_place(tmp_path: Path, line: str, methods: str, message: str) -> None:
+def test_what_cannot_be_predicted_is_refused_in_place(tmp_path, line, methods, message):
     config = write(tmp_path, ("seed: 3", f"seed: 3\n{line}"), ('["trained.py:Gain"]', methods))
     assert_refused(config, message)
 
 
-def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physics: None) -> None:
+def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path, no_physics):
     config = write(tmp_path, PREDICTION, ("trained.py:Gain", "narrow.py:Even"))
     plugins = (tmp_path / "trained.py").read_text()
     (tmp_path / "narrow.py").write_text(plugins.replace("*bench.spec.region.shape)", "5, 5)"))
@@ -85,18 +77,18 @@ def test_a_prediction_of_another_shape_is_a_failed_cell(tmp_path: Path, no_physi
 
 
 @pytest.mark.parametrize("measure", ["picture", "prediction"])
-def test_only_the_metrics_that_a_study_names_are_computed(tmp_path: Path, measure: str) -> None:
+def test_only_the_metrics_that_a_study_names_are_computed(tmp_path, measure):
     kind = PREDICTION if measure == "prediction" else ("", "")
     named = ("methods:", "protocol: {metrics: [psnr, speckle_contrast]}\nmethods:")
     records = compute(write(tmp_path, METHODS, named, kind)).records
     assert {record["state"] for record in records} == {"done"}
-    assert {*plan(load_study(tmp_path / "study.yaml")).metrics} == {"psnr", "speckle_contrast", "match", "refine"}
+    assert {*planned(tmp_path / "study.yaml").metrics} == {"psnr", "speckle_contrast", "match", "refine"}
     scores = {key for record in records for key in record["scores"]}
     assert {"psnr_linear", "psnr_srgb"} <= scores
     assert not any(name in key for key in scores for name in ("ssim", "mofd", "flip", "vsi"))
 
 
-def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_hologram_of_a_probe_whose_code_changed_is_another(monkeypatch):
     solved: list[Any] = []
     bench = SimpleNamespace(photograph=lambda phase, *_, **__: None)
     monkeypatch.setattr(predicting, "_photographs", OrderedDict())

@@ -1,7 +1,5 @@
 """A method of somebody else's code that changes the harness stops the run, and is named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -12,41 +10,9 @@ from holobench_eval.core.errors import StopError
 from holobench_eval.metrics import protocol
 from holobench_eval.study.store import Store
 from tests.study.studies import MILD, compute, write_study
+from tests.support.plugins import text
 
-METHODS = """
-from dataclasses import dataclass
-
-import torch
-from holobench_eval.metrics import protocol
-
-
-@dataclass(frozen=True)
-class Honest:
-    def solve(self, target, bench):
-        return torch.zeros((*target.shape[:2], *bench.spec.shape))
-
-
-@dataclass(frozen=True)
-class Flatterer(Honest):
-    def solve(self, target, bench):
-        refine = protocol.match
-        protocol.match = lambda image, target, *more, **named: (target, refine(image, target, *more, **named)[1])
-        return super().solve(target, bench)
-
-
-@dataclass(frozen=True)
-class Silencer(Honest):
-    def solve(self, target, bench):
-        torch.randn = lambda *shape, **options: torch.zeros(*shape)
-        return super().solve(target, bench)
-
-
-@dataclass(frozen=True)
-class Failing(Honest):
-    def solve(self, target, bench):
-        torch.randn = lambda *shape, **options: torch.zeros(*shape)
-        raise ValueError("and then it fails")
-"""
+METHODS = text("harmful")
 
 
 def study(folder: Path, *methods: str) -> Path:
@@ -57,25 +23,25 @@ def study(folder: Path, *methods: str) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+def _as_before(monkeypatch):
     """Undo what the methods change."""
     monkeypatch.setattr(protocol, "match", protocol.match)
     monkeypatch.setattr(torch, "randn", torch.randn)
 
 
-def test_an_honest_method_is_let_through(tmp_path: Path) -> None:
-    outcome = compute(study(tmp_path, "Honest"), tmp_path / "out")
+def test_an_honest_method_is_let_through(tmp_path):
+    outcome = compute(study(tmp_path, "honest"), tmp_path / "out")
     assert {record["state"] for record in outcome.records} == {"done"}
 
 
-@pytest.mark.parametrize("name", ["Flatterer", "Silencer", "Failing"])
-def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["flatterer", "silencer", "failing"])
+def test_a_method_that_changes_the_harness_stops_the_run_and_scores_nothing(tmp_path, name):
     with pytest.raises(StopError, match=rf"method 'methods.py:{name}' has changed the harness: .* leto-mild"):
         compute(study(tmp_path, name), tmp_path / "out")
     scored = [path for path in Store(tmp_path / "out").folder.glob("*.json") if name in path.read_text()]
     assert scored == []
 
 
-def test_what_the_package_ships_is_not_guarded(tmp_path: Path) -> None:
+def test_what_the_package_ships_is_not_guarded(tmp_path):
     assert plugins.is_shipped("methods", "wirtinger")
-    assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:Honest")
+    assert not plugins.is_shipped("methods", f"{tmp_path}/methods.py:honest")

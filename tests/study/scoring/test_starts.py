@@ -1,14 +1,12 @@
 """A method that follows the others of its study: its plan, its starts, and what is computed again."""
 
-from __future__ import annotations
-
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import torch
@@ -19,27 +17,22 @@ from holobench_eval.study import store as storing
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local
 from holobench_eval.study.phases import phases_of, start_of
-from holobench_eval.study.plan import Cell, Plan, plan
+from holobench_eval.study.plan import Cell, Plan
 from holobench_eval.study.running import run as running
 from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
-from tests.study.studies import add_other_profile
-from tests.support.fake_study import fake_work, held, installed, solves, untimed, write_config
+from tests.study.studies import add_other_profile, planned
 from tests.support.patience import killed_at
+from tests.support.studies.fake_study import fake_work, held, installed, solves, untimed, write_config
 
-pytestmark = pytest.mark.usefixtures("no_physics")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
 
-POOR, GOOD = (
-    '{{name: "plugins.py:Toy", label: {}, params: {{value: {}}}}}'.format(*row) for row in (("poor", 1), ("good", 5))
-)
+POOR = '{name: "plugins.py:Toy", label: poor, params: {value: 1}}'
+GOOD = POOR.replace("poor", "good").replace("1", "5")
 FOLLOWING = '{name: "plugins.py:Following", label: oracle}'
 FAILING = '{name: "plugins.py:Toy", label: good, params: {value: 5, fail: "no light"}}'
 TARGETS = ("gray 0", "gray 1")
-
-
-def planned(config: Path) -> Plan:
-    return plan(load_study(config))
 
 
 def cells(grid: Plan, label: str) -> list[Cell]:
@@ -57,7 +50,7 @@ def score(records: list[dict[str, Any]], label: str, target: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def computed(tmp_path_factory):
     """The folder of a computed study, which no test changes."""
     folder = tmp_path_factory.mktemp("computed")
     with installed():
@@ -66,23 +59,23 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def grid(computed: Path) -> Plan:
+def grid(computed):
     return planned(computed / "study.yaml")
 
 
 @pytest.fixture
-def done(computed: Path, tmp_path: Path) -> Path:
+def done(computed, tmp_path):
     """The config of that study in a folder of its own."""
     shutil.copytree(computed, tmp_path, dirs_exist_ok=True)
     return tmp_path / "study.yaml"
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
+def store(tmp_path):
     return Store(tmp_path / "out")
 
 
-def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repeat(tmp_path: Path) -> None:
+def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repeat(tmp_path):
     add_other_profile(tmp_path)
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), profiles="ideal, other.yaml", count=2)
     config.write_text(f"{config.read_text()}repeats: 2\n")
@@ -90,14 +83,13 @@ def test_a_cell_starts_from_those_of_all_others_for_its_target_display_and_repea
     by_id = {cell.id: cell for cell in grid.cells}
     for cell in cells(grid, "oracle"):
         others = [by_id[identity] for identity in cell.starts]
-        assert {(one.target, one.condition, one.repeat) for one in others} == {
-            (cell.target, cell.condition, cell.repeat)
-        }
+        for one in others:
+            assert (one.target, one.condition, one.repeat) == (cell.target, cell.condition, cell.repeat)
         assert sorted(one.params["value"] for one in others) == [1, 5]
         assert set(cell.phase["starts"]) == {one.phase_id for one in others}
 
 
-def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path: Path) -> None:
+def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_knows_nothing_of_it(tmp_path):
     studies = (POOR, GOOD, FOLLOWING), (FOLLOWING, GOOD, POOR), (POOR, FOLLOWING), (POOR, GOOD)
     both, turned, fewer, without = (planned(write_config(tmp_path, methods, count=1)) for methods in studies)
     assert {cell.id for cell in both.cells} == {cell.id for cell in turned.cells}
@@ -105,10 +97,7 @@ def test_its_identity_is_that_of_its_starts_whatever_their_order_and_theirs_know
     assert {cell.id for cell in without.cells} < {cell.id for cell in both.cells}
 
 
-@pytest.mark.slow
-def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_process_does(
-    done: Path, store: Store, grid: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_process_does(done, store, grid, monkeypatch):
     serial = store.load(grid)
     for target in TARGETS:
         assert score(serial, "oracle", target) == pytest.approx(score(serial, "good", target), abs=1e-3)
@@ -120,7 +109,7 @@ def test_several_workers_pick_up_the_better_phase_of_another_method_as_one_proce
     assert [{**one, "alone": None} for one in untimed(local)] == [{**one, "alone": None} for one in untimed(serial)]
 
 
-def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_again(tmp_path: Path) -> None:
+def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_again(tmp_path):
     config = write_config(tmp_path, (FOLLOWING, POOR, FAILING), count=2)
     first = compute(config)
     assert [one["label"] for one in first if one["state"] == "failed"] == ["good"]
@@ -137,9 +126,7 @@ def test_a_failed_start_is_no_start_and_once_it_is_there_the_cell_is_computed_ag
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_and_gives_the_same_record(
-    done: Path, store: Store, grid: Plan, lost: bool
-) -> None:
+def test_a_start_is_solved_again_only_where_its_phase_was_lost_and_gives_the_same_record(done, store, grid, lost):
     solved = len(solves(done.parent))
     alone = untimed([one for one in store.load(grid) if one["label"] != "oracle"])
     followers = cells(grid, "oracle")
@@ -150,9 +137,7 @@ def test_a_start_is_solved_again_for_a_follower_only_where_its_phase_was_lost_an
     assert untimed([one for one in together if one["label"] != "oracle"]) == alone
 
 
-def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_is_computed(
-    done: Path, store: Store, grid: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cell_whose_start_has_to_be_computed_loses_its_record_first(done, store, grid, monkeypatch):
     first, follower = cells(grid, "poor")[0], cells(grid, "oracle")[0]
     store.path(first.id).unlink()
     states = store.states(grid.cells)
@@ -163,7 +148,7 @@ def test_a_cell_whose_start_has_to_be_computed_loses_its_record_before_anything_
     assert not store.path(follower.id).exists()
 
 
-def test_starts_that_are_only_timed_again_leave_their_followers_alone(done: Path, store: Store, grid: Plan) -> None:
+def test_starts_that_are_only_timed_again_leave_their_followers_alone(done, store, grid):
     for cell in grid.cells:
         if (record := store.read(cell.id)) is not None and record.alone:
             store.write(replace(record, alone=False))
@@ -177,15 +162,10 @@ def test_starts_that_are_only_timed_again_leave_their_followers_alone(done: Path
 
 
 @pytest.mark.parametrize("refusal", ["refuse_unscored", "refuse_unavailable"])
-def test_a_run_that_is_refused_removes_no_record(
-    done: Path, store: Store, grid: Plan, refusal: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(*_: Any) -> None:
-        raise UserError("not here")
-
+def test_a_run_that_is_refused_removes_no_record(done, store, grid, refusal, monkeypatch):
     store.remove((cells(grid, "poor")[0].id,))
     before = store.states(grid.cells)
-    monkeypatch.setattr(running, refusal, refused)
+    monkeypatch.setattr(running, refusal, Mock(side_effect=UserError("not here")))
     with pytest.raises(UserError, match="not here"):
         compute(done)
     assert store.states(grid.cells) == before
@@ -206,9 +186,7 @@ def starts_of(store: Store, cell: Cell) -> list[torch.Tensor]:
 
 @pytest.mark.usefixtures("done")
 @pytest.mark.parametrize("file", [record_file, phase_file])
-def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is_late(
-    store: Store, grid: Plan, file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is_late(store, grid, file, monkeypatch):
     follower, late = cells(grid, "oracle")[0], file(store, cells(grid, "good")[0])
     before = starts_of(store, follower)
     hidden = late.rename(late.with_name("hidden"))
@@ -224,23 +202,20 @@ def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is
 
 
 @pytest.mark.usefixtures("done")
-def test_a_start_in_a_damaged_file_is_an_error(store: Store, grid: Plan) -> None:
+def test_a_start_in_a_damaged_file_is_an_error(store, grid):
     file = phase_file(store, cells(grid, "good")[0])
     file.write_bytes(file.read_bytes()[:-100])
     with pytest.raises(CellError, match=r"\.pt, from which this method starts, is damaged; delete the file"):
         starts_of(store, cells(grid, "oracle")[0])
 
 
-def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian() -> None:
+def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian():
     phase = torch.linspace(-9, 9, 2 * 5 * 7).view(2, 5, 7)
     start = start_of(phase)
     assert float((torch.exp(1j * start) - torch.exp(1j * phase)).abs().max()) < 1e-4
 
 
-@pytest.mark.slow
-def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(
-    computed: Path, grid: Plan, tmp_path: Path
-) -> None:
+def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(computed, grid, tmp_path):
     config = write_config(tmp_path, (FOLLOWING, POOR, GOOD), count=len(TARGETS))
     for index, begun in ((1, 3), (0, 6)):  # while a start is solved, and while the first follower is
         with held(tmp_path, index):
@@ -249,7 +224,7 @@ def test_a_run_killed_before_and_at_the_followers_gives_the_same_records(
     assert untimed(compute(config)) == untimed(whole)
 
 
-def test_a_phase_that_began_with_another_of_the_same_name_is_not_used(done: Path, store: Store, grid: Plan) -> None:
+def test_a_phase_that_began_with_another_of_the_same_name_is_not_used(done, store, grid):
     phases, solved = phases_of(store.output), len(solves(done.parent))
     follower = cells(grid, "oracle")[0]
     for other in grid.cells:  # as another training leaves them

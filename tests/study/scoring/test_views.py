@@ -1,7 +1,5 @@
 """Light fields: what is planned, which method sees what, and what it is worth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -9,7 +7,7 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.study.config import load_study
 from tests.study.studies import assert_refused, exchanged, tasks_of
-from tests.support.trained_study import compute
+from tests.support.studies.trained_study import compute
 
 CONFIG = """\
 title: "Views"
@@ -33,18 +31,17 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path: Path) -> None:
+def test_every_method_makes_one_hologram_of_a_scene_that_all_places_see(tmp_path):
     tasks = tasks_of(write(tmp_path, TWO_SCENES, TWO_DISPLAYS))
     for label in ("wirtinger", "light_field"):
         for task in tasks[label]:
-            assert {cell.target.split(" ")[0] for cell in task.cells} == {task.cells[0].target.split(" ")[0]}
+            assert len({cell.target.split(" ")[0] for cell in task.cells}) == 1
             assert {cell.change["eye_pupil"] for cell in task.cells} == {"-0.4", "0.1", "0.4"}
-        cells = [cell for task in tasks[label] for cell in task.cells]
-        assert len(cells) == 2 * 3 * 2
-        assert {cell.condition for cell in cells} == {"ideal-frames", "plm-4bit"}
+        displays = [cell.condition for task in tasks[label] for cell in task.cells]
+        assert sorted(displays) == ["ideal-frames"] * 6 + ["plm-4bit"] * 6
 
 
-def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path: Path) -> None:
+def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path):
     tasks, dataset = tasks_of(write(tmp_path)), load_study(tmp_path / "study.yaml").dataset
     views = sorted(dataset.views("shapes from 0.1"), key=lambda view: abs(dataset.place(view)))
     (one, every) = (tasks[label][0].cells[0].phase for label in ("wirtinger", "light_field"))
@@ -53,7 +50,7 @@ def test_a_phase_is_named_by_the_views_that_its_method_is_given(tmp_path: Path) 
     assert not one.get("planes")
 
 
-def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(tmp_path: Path) -> None:
+def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(tmp_path):
     records = compute(write(tmp_path)).records
     assert {record["state"] for record in records} == {"done"}, [record["reason"] for record in records]
     scores = {(r["label"], r["cell"]["target"]): r["scores"].get("psnr_linear") for r in records}
@@ -64,48 +61,35 @@ def test_frames_that_know_the_views_are_better_off_centre_than_the_middle_view(t
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            (CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"),
-            "4:20: dataset 'charts' has no",
-        ),
+        ((CONFIG[CONFIG.index("light_fields") : CONFIG.index("}\nmethods")], "charts"), "4:20: dataset 'charts' has"),
         (("[-0.4, 0.1, 0.4]", "[1.4]"), "4:51: dataset 'light_fields': parameter 'places.0'"),
-        (
-            ("light_field, params: {frames: 4", "light_field, params: {frames: 9"),
-            "7:12: frames: 9; 'ideal-frames' shows",
-        ),
+        (("frames: 4", "frames: 9"), "7:12: frames: 9; 'ideal-frames' shows"),
         (("profiles: [ideal-frames.yaml]", "profiles: [pluto-fourier]"), "2:10: measure: views needs a Fresnel plane"),
     ],
 )
-def test_what_has_no_views_is_refused_at_its_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+def test_what_has_no_views_is_refused_at_its_place(tmp_path, change, message):
     assert_refused(write(tmp_path, change), message)
 
 
-DATASET = """
+CODE = """
 from holobench_eval.datasets.light_fields import LightFields
 
 class Wide(LightFields):
     def place(self, view):
         return 3 * super().place(view)
-"""
-METHOD = """
-from dataclasses import dataclass
-from typing import ClassVar
 
-@dataclass(frozen=True)
-class Blind:
-    views: ClassVar[bool] = True
+def blind(target, bench):
+    return target
 
-    def solve(self, target, bench):
-        return target
+blind.views = True
 """
 
 
-def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "wide.py").write_text(DATASET)
-    path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'wide.py:Wide', params"))
+def test_code_of_a_users_own_that_does_not_keep_its_word_is_refused(tmp_path):
+    (tmp_path / "mine.py").write_text(CODE)
+    path = write(tmp_path, ("{dataset: light_fields, params", "{dataset: 'mine.py:Wide', params"))
     with pytest.raises(UserError, match=r"from -1\.2.*; expected places from '-1' to '1' radii of the iris"):
         load_study(path)
-    (tmp_path / "blind.py").write_text(METHOD)
-    path = write(tmp_path, ("{name: wirtinger, params: {iterations: 30}}", "'blind.py:Blind'"))
-    with pytest.raises(UserError, match=r"Blind': views is True, which needs a function solve_views"):
+    path = write(tmp_path, ("{name: wirtinger, params: {iterations: 30}}", "'mine.py:blind'"))
+    with pytest.raises(UserError, match=r"blind': views is True, which needs a function solve_views"):
         load_study(path)

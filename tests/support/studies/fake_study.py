@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import time
 import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,94 +26,7 @@ from holobench_eval.study.scoring.cell import work
 from holobench_eval.study.scoring.job import Job
 from holobench_eval.study.store import Record
 
-PLUGINS = '''
-import hashlib
-import time
-from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar
-
-import torch
-
-LOG = Path(__file__).with_name("solves.txt")
-
-
-@dataclass(frozen=True)
-class Gray:
-    """A fake dataset of even grays."""
-
-    count: int = 3
-
-    def items(self):
-        return [f"gray {i}" for i in range(self.count)]
-
-    def digest(self, item):
-        return hashlib.sha256(item.encode()).hexdigest()
-
-    def load(self, item, shape, channels=3):
-        return torch.full((channels, *shape), (1 + int(item.split()[1])) / 10)
-
-
-@dataclass(frozen=True)
-class Training(Gray):
-    training: ClassVar[bool] = True
-
-
-@dataclass(frozen=True)
-class Toy:
-    """A fake method: a constant phase, and a line in a file for every solution; it waits while a test holds it."""
-
-    value: float = 1.0
-    pause: float = 0.0
-    fail: str = ""
-    camera: ClassVar[bool] = False
-    privileged: ClassVar[bool] = False
-
-    def solve(self, target, bench):
-        with LOG.open("a") as log:
-            log.write(f"{type(self).__name__} {self.value} {float(target.mean()):.1f}\\n")
-        time.sleep(self.pause)
-        while LOG.with_name(f"hold {float(target.mean()):.1f}").exists():
-            time.sleep(0.01)
-        if self.fail and abs(float(target.mean()) - 0.2) < 1e-3:
-            raise ValueError(self.fail)
-        shape = (*target.shape[:2], *bench.spec.shape)
-        return torch.full(shape, self.value) + 0.01 * torch.rand(shape, generator=bench.generator("toy"))
-
-
-@dataclass(frozen=True)
-class Nameless(Toy):
-    def solve(self, target, bench):
-        raise ValueError(chr(0xDCFF) + ".png")
-
-
-class Target(torch.Tensor):
-    """Would answer the display's own questions with the target."""
-
-
-@dataclass(frozen=True)
-class Disguised(Toy):
-    def solve(self, target, bench):
-        return super().solve(target, bench).as_subclass(Target)
-
-
-@dataclass(frozen=True)
-class Seeing(Toy):
-    camera: ClassVar[bool] = True
-
-
-@dataclass(frozen=True)
-class Following(Toy):
-    """Its own phase, or that of another method with the largest mean; the fake display likes it best."""
-
-    privileged: ClassVar[bool] = True
-    follows: ClassVar[bool] = True
-
-    def solve(self, target, bench):
-        phases = super().solve(target, bench), *(start[None] for start in bench.starts)
-        return max(phases, key=lambda phase: phase.mean())
-'''
-
+PLUGINS = Path(__file__).with_name("fake_plugins.py").read_text()
 CONFIG = """\
 title: "Fake"
 seed: 3
@@ -125,16 +38,23 @@ methods:
 
 
 def write_config(
-    folder: Path, methods: tuple[str, ...] = ("plugins.py:Toy",), count: int = 3, profiles: str = "ideal"
+    folder: Path,
+    methods: tuple[str, ...] = ("plugins.py:Toy",),
+    count: int = 3,
+    profiles: str = "ideal",
+    inside: bool = False,
 ) -> Path:
-    """A config and the plug-ins it names, in a folder."""
+    """A config and the plug-ins it names, in a folder. inside: methods have no process of their own."""
     (folder / "plugins.py").write_text(PLUGINS)
     path = folder / "study.yaml"
     entries = "\n".join(f"  - {method}" for method in methods)
     text = CONFIG.format(methods=entries, count=count, profiles=profiles)
-    privileged = any("Following" in method for method in methods)
-    path.write_text(f"{text}isolation: none\n" if privileged else text)
+    inside = inside or any("Following" in method for method in methods)  # which is privileged
+    path.write_text(f"{text}isolation: none\n" if inside else text)
     return path
+
+
+write_inside = partial(write_config, inside=True)
 
 
 @contextmanager
@@ -248,11 +168,3 @@ def noted_work(task: Job) -> list[Record]:
 def untimed(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Records without what each run measures itself."""
     return [{**record, "seconds": None, "memory_mib": None, "cpu_s": None, "reused": False} for record in records]
-
-
-if __name__ == "__main__":
-    from holobench_eval.commands import main
-
-    install()
-    sys.argv[0] = "holoeval"
-    main()

@@ -1,6 +1,5 @@
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +11,7 @@ from holobench_eval.display.simulated.profile import Profile
 from holobench_eval.display.simulated.stages import PixelAperture
 
 
-def test_a_new_display_is_the_panel_that_it_starts_from_with_all_else_off(tmp_path: Path) -> None:
+def test_a_new_display_is_the_panel_that_it_starts_from_with_all_else_off(tmp_path):
     new_display("mine", tmp_path)
     profile = load_profile(str(tmp_path / "mine.yaml"))
     assert profile.panel == load_profile("ideal").panel
@@ -20,7 +19,7 @@ def test_a_new_display_is_the_panel_that_it_starts_from_with_all_else_off(tmp_pa
     assert profile == plain
 
 
-def test_a_new_display_names_every_key_and_loads_with_all_of_them(tmp_path: Path) -> None:
+def test_a_new_display_names_every_key_and_loads_with_all_of_them(tmp_path):
     text = display_text("mine")
     for parameter in parameters(Profile):
         key = parameter.name.rpartition(".")[2]
@@ -38,7 +37,7 @@ def test_a_new_display_names_every_key_and_loads_with_all_of_them(tmp_path: Path
     ("name", "says"),
     [("my display", "no name for a display"), ("ideal", "a display that ships"), ("mine", "exists already")],
 )
-def test_a_name_that_cannot_be_is_one_line_and_writes_nothing(tmp_path: Path, name: str, says: str) -> None:
+def test_a_name_that_cannot_be_is_one_line_and_writes_nothing(tmp_path, name, says):
     (tmp_path / "mine.yaml").write_text("own: work\n")
     with pytest.raises(UserError, match=says):
         new_display(name, tmp_path)

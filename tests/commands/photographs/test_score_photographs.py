@@ -1,7 +1,6 @@
 """``holoeval score`` on photographs as laboratories have them: one laser, too dark, cut off, speckled, aligned."""
 
 import io
-import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -30,8 +29,9 @@ LASERS = np.array([1.0, 0.9, 0.8], np.float32)[:, None, None]
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    """Only the two metrics that are quick."""
+    """Only the two metrics that are quick, and one aligner."""
     monkeypatch.setattr(scored_pictures, "score", few)
+    monkeypatch.setattr(scored_pictures, "second_warp", lambda _frame, _reference, first: first)
 
 
 def run(root: Path, values: str = "stored", **options: Any) -> tuple[str, str, pd.DataFrame]:
@@ -97,9 +97,8 @@ def test_captures_that_have_little_of_their_target_in_common_are_refused_with_th
     save(tmp_path / "captures" / "right" / "astronaut.png", capture[:, :, 95:])
     text, _, records = run(tmp_path, visible=True)
     assert (records["state"] == "failed").all()
-    assert re.search(
-        r"have 3\d% of it in common \(left 6\d%, right 6\d%\), and 50% is needed", records["reason"].iloc[0]
-    )
+    said = r"have 3\d% of it in common \(left 6\d%, right 6\d%\), and 50% is needed"
+    assert records["reason"].str.contains(said).all()
     assert "in common" in text
 
 
@@ -154,25 +153,24 @@ def test_a_target_that_no_capture_shows_has_no_floor_and_alone_it_makes_a_report
 
 
 def test_captures_that_are_mirrored_clipped_or_nearly_the_target_are_named_and_the_target_itself_is_refused(tmp_path):
-    for name in ("astronaut", "coffee"):
-        target = photograph(name, SHAPE)
-        for method, shown, gain in (("fair", target, 0.9), ("clipped", target, 2), ("mirrored", target[..., ::-1], 1)):
-            draw = np.random.default_rng(5)
-            where, size = pose(draw, SHAPE, scale=1.3)
-            capture = captured(np.ascontiguousarray(shown), where, size, draw, contrast=0.2)
-            save(tmp_path / "captures" / method / f"{name}.png", np.clip(gain * capture, 0, 1))
-        for folder in ("targets", "captures/itself"):
-            save(tmp_path / folder / f"{name}.png", target)
-        save(tmp_path / "captures" / "padded" / f"{name}.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
+    target = photograph("astronaut", SHAPE)
+    for method, shown, gain in (("fair", target, 0.9), ("clipped", target, 2), ("mirrored", target[..., ::-1], 1)):
+        draw = np.random.default_rng(5)
+        where, size = pose(draw, SHAPE, scale=1.3)
+        capture = captured(np.ascontiguousarray(shown), where, size, draw, contrast=0.2)
+        save(tmp_path / "captures" / method / "astronaut.png", np.clip(gain * capture, 0, 1))
+    for folder in ("targets", "captures/itself"):
+        save(tmp_path / folder / "astronaut.png", target)
+    save(tmp_path / "captures" / "padded" / "astronaut.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
     text, terminal, records = run(tmp_path)
     assert (records.drop("itself")["state"] == "done").all()
-    assert (records.loc["itself", "state"] == "failed").all()
-    assert records.loc["itself", "reason"].str.contains("is the target itself, value for value").all()
-    share = records.loc[("clipped", "astronaut"), "saturated"]
+    itself, share = records.loc[("itself", "astronaut")], records.loc[("clipped", "astronaut"), "saturated"]
+    assert itself["state"] == "failed"
+    assert "is the target itself, value for value" in itself["reason"]
     assert share > 0.05
     for said in (text, terminal):
-        assert "is not: padded/astronaut, padded/coffee." in said
-        assert "so: mirrored/astronaut, mirrored/coffee." in said
+        assert "is not: padded/astronaut." in said
+        assert "so: mirrored/astronaut." in said
         assert f"clipped/astronaut {share:.2%}" in said
     assert "fair/" not in terminal
 
@@ -203,12 +201,9 @@ def test_a_black_level_that_turns_the_order_is_told_and_dark_takes_it_off(tmp_pa
     assert off["bright"] == pytest.approx(true["bright"], abs=0.1)
     assert "Bright where the target is darkest, by more than 5% of its white: dim/astronaut" in wrong[1]
     assert "Bright where" not in right[1] + terminal
-    assert (
-        "although --dark took 4 counts off: dim/astronaut"
-        in run(tmp_path / "black", "linear", aligned=True, dark="4")[1]
-    )
     assert "Darker than" not in text + wrong[0]
-    assert "Darker than the target" in run(tmp_path / "black", "linear", aligned=True, dark="4800")[1]
+    for dark, said in (("4", "although --dark took 4 counts off: dim/astronaut"), ("4800", "Darker than the target")):
+        assert said in run(tmp_path / "black", "linear", aligned=True, dark=dark)[1]
     with pytest.raises(UserError, match="not off encoded values; expected --values linear"):
         run(tmp_path / "black", "srgb", dark="4096")
     for path in (tmp_path / "none" / "captures").glob("*/*.tif"):  # too much was taken off by other software
@@ -247,11 +242,10 @@ def test_a_clipped_capture_of_linear_light_is_refused_as_in_a_study_though_dark_
 
 
 def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tmp_path):
-    for name, other in (("astronaut", "coffee"), ("coffee", "astronaut")):
-        save(tmp_path / "targets" / f"{name}.png", photograph(name, SHAPE))
-        for method, shown in (("right", name), ("wrong", other)):
-            seen = captured(photograph(shown, SHAPE), np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.3)
-            save(tmp_path / "captures" / method / f"{name}.png", 0.9 * seen)
+    save(tmp_path / "targets" / "astronaut.png", photograph("astronaut", SHAPE))
+    for method, shown in (("right", "astronaut"), ("wrong", "coffee")):
+        seen = captured(photograph(shown, SHAPE), np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.3)
+        save(tmp_path / "captures" / method / "astronaut.png", 0.9 * seen)
     text, terminal, records = run(tmp_path, aligned=True)
     assert (records["state"] == "done").all()
     for told in (text, terminal):
@@ -259,14 +253,12 @@ def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tm
     assert "right/" not in terminal.partition("Not alike")[2].partition("\n")[0]
 
 
-@pytest.mark.parametrize("values", ["stored", "srgb", "linear"])
-@pytest.mark.parametrize("place", ["targets", "captures/m"])
+@pytest.mark.parametrize(("values", "place"), [("stored", "targets"), ("srgb", "captures/m"), ("linear", "captures/m")])
 def test_red_and_blue_that_changed_places_have_no_score_but_a_reason(tmp_path, place, values):
-    for name in ("astronaut", "coffee"):
-        target = photograph(name, SHAPE)
-        save(tmp_path / "targets" / f"{name}.png", target)
-        seen = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.5) * LASERS * 0.9
-        save(tmp_path / "captures" / "m" / f"{name}.png", seen)
+    target = photograph("astronaut", SHAPE)
+    save(tmp_path / "targets" / "astronaut.png", target)
+    seen = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.5) * LASERS * 0.9
+    save(tmp_path / "captures" / "m" / "astronaut.png", seen)
     assert (run(tmp_path, values, aligned=True)[2]["state"] == "done").all()
     for path in (tmp_path / place).iterdir():
         cv2.imwrite(str(path), cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))

@@ -1,7 +1,6 @@
 """What ``holoeval score`` and its report say of methods that lack targets, and of how to rank them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from holobench_eval.study.folders.pairing import UNKNOWN
 from tests.support.synthetic_study import cell, layout, record, study
 
 
-def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path: Path) -> None:
+def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
     records, given = study(tmp_path, size=24), layout(measure=FILES)
     one = lacking(Results(records_frame(records, given), given))  # GS lacks coffee on a display
     assert one.startswith("Only the 11 methods that have every target are ranked: GS on leto-aged lacks 1 of 6 targets")
@@ -44,7 +43,7 @@ def holed(*holes: tuple[str, str, str, str]) -> Results:
     return Results(records_frame(records, given), given)
 
 
-def test_methods_that_lack_targets_are_told_though_others_are_complete() -> None:
+def test_methods_that_lack_targets_are_told_though_others_are_complete():
     results = holed(("missing", "c", "t1", "no capture"), ("missing", "b", "t1", "no"), ("missing", "c", "t3", "no"))
     said = lacking(results)
     assert "b lacks 1 of 4 targets (t1), c lacks 2 of 4 targets (t1, t3). Add the captures that are missing" in said
@@ -54,7 +53,7 @@ def test_methods_that_lack_targets_are_told_though_others_are_complete() -> None
     assert lacking(holed()) == ""
 
 
-def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_the_others() -> None:
+def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_the_others():
     nothing = [("failed", "c", f"t{index}", "too faint") for index in range(4)]
     said = lacking(holed(*nothing, ("failed", "b", "t0", "too faint")))
     assert "c lacks all 4 targets" in said
@@ -73,7 +72,7 @@ def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_th
         "its own; 0.2 to 8 are allowed: resize the target",
     ],
 )
-def test_nobody_takes_a_capture_again_for_a_fault_of_its_target_or_its_file(reason: str) -> None:
+def test_nobody_takes_a_capture_again_for_a_fault_of_its_target_or_its_file(reason):
     said = lacking(holed(*(("failed", method, "t1", reason) for method in "abc")))
     assert "Save or choose the target t1 anew, whose fault it is and not the captures'" in said
     assert "again" not in said
@@ -82,7 +81,7 @@ def test_nobody_takes_a_capture_again_for_a_fault_of_its_target_or_its_file(reas
     assert "save b/t2 anew, as the reasons say; take the failed captures again" in both
 
 
-def test_the_reasons_that_blame_a_target_are_those_that_are_given() -> None:
+def test_the_reasons_that_blame_a_target_are_those_that_are_given():
     for plain in (np.full((1, 64, 64), 0.5), np.tile(np.sin(np.arange(96)) / 2 + 0.5, (1, 96, 1))):
         with pytest.raises(CellError, match=PLAIN):
             align(np.pad(plain, ((0, 0), (9, 9), (9, 9))), plain)

@@ -18,7 +18,7 @@ KINDS = ("method", "camera", "trains")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_new_method_is_clean_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
+def test_a_new_method_is_clean_and_passes_its_own_test(kind, tmp_path):
     _, test, _ = write_method("quiet_phase", tmp_path / "mine", kind)
     runpy.run_path(str(test))["test_quiet_phase_keeps_the_contract"]()
     ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--line-length", "120", str(tmp_path)]
@@ -27,7 +27,7 @@ def test_a_new_method_is_clean_and_passes_its_own_test(kind: str, tmp_path: Path
     assert done.returncode == 0, done.stdout
 
 
-def test_a_new_method_gets_nearer_to_its_target_with_every_step(tmp_path: Path) -> None:
+def test_a_new_method_gets_nearer_to_its_target_with_every_step(tmp_path):
     _, _, named = write_method("quiet_phase", tmp_path)
     assert named == f"{tmp_path}/quiet_phase.py:QuietPhase"
     bench = open_bench(load_profile("ideal"), (64, 64), seed=0)
@@ -58,9 +58,7 @@ methods:
 """
 
 
-def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_method("sees", tmp_path, "camera")
     write_method("learns", tmp_path, "trains")
@@ -72,7 +70,7 @@ def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(
     assert (rows.loc[["limited", "learned"], "psnr_linear_db"] > rows.loc["wirtinger", "psnr_linear_db"]).all()
 
 
-def test_existing_files_are_never_overwritten(tmp_path: Path) -> None:
+def test_existing_files_are_never_overwritten(tmp_path):
     (tmp_path / "test_quiet_phase.py").write_text("mine")
     with pytest.raises(UserError, match="exists already"):
         write_method("quiet_phase", tmp_path)
@@ -81,13 +79,13 @@ def test_existing_files_are_never_overwritten(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "2fast", "Quiet", "a-b", "../a", "class", "a.b", "_x", "é", "random", "torch"])
-def test_names_that_are_no_modules_or_would_hide_one_are_refused(tmp_path: Path, name: str) -> None:
+def test_names_that_are_no_modules_or_would_hide_one_are_refused(tmp_path, name):
     with pytest.raises(UserError, match="would hide" if name in ("random", "torch") else "is no name for a method"):
         write_method(name, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         write_method("quiet_phase", tmp_path / "file" / "folder")

@@ -9,13 +9,14 @@ import pytest
 
 from holobench_eval.lab.session import read_manifest
 from tests.lab.session.running import run, succeed
+from tests.study.studies import write_green
 from tests.support.photographing import Lab
 
-# leto-mild on this panel
+# leto-mild on this panel, by one of its lasers
 BENCH = """\
 name: ours
 version: 1
-panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [6.36e-7, 5.17e-7, 4.46e-7], distance: 0.0118518518, bits: 8, \
+panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.17e-7], distance: 0.0118518518, bits: 8, \
 pupil: 0.8, region: 0.8}
 laser: {callable: 'evil.py:run'}
 slm: {driver: monitor, name: x, resolution: [128, 128]}
@@ -28,19 +29,14 @@ methods: [double_phase]
 protocol: {metrics: [psnr]}
 """
 OWN = STUDY.replace("photographs, params: {count: 1}", "folder, params: {path: images}").replace(
-    "double_phase", "own.py:Elsewhere"
+    "double_phase", "own.py:elsewhere"
 )
 METHOD = """\
-from dataclasses import dataclass
-
 import torch
 
-
-@dataclass(frozen=True)
-class Elsewhere:
-    def solve(self, target, bench):
-        torch.seed()  # as on another machine: no two solutions are the same
-        return 6.2831 * torch.rand(*target.shape[:2], *bench.spec.shape)
+def elsewhere(target, bench):
+    torch.seed()  # as on another machine: no two solutions are the same
+    return 6.2831 * torch.rand(*target.shape[:2], *bench.spec.shape)
 """
 
 
@@ -61,7 +57,7 @@ def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
     lay_out(old, study)
     monkeypatch.chdir(old)
     succeed("session", "export", "study.yaml", "session")
-    Lab("leto-mild", (128, 128), seed=6).photograph_round(old / "session", 1)
+    Lab(str(write_green(old, "leto-mild")), (128, 128), seed=6).photograph_round(old / "session", 1)
     new.mkdir(parents=True)
     monkeypatch.chdir(new)
     shutil.move(old / "session", new / "session")
@@ -69,17 +65,15 @@ def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, study: str) -> Path:
     return new / "session"
 
 
-def test_a_session_with_its_bench_file_imports_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_session_with_its_bench_file_imports_anywhere(tmp_path, monkeypatch):
     session = moved(tmp_path, monkeypatch, STUDY)
     assert "table.csv" in succeed("session", "import", session)
 
 
-def test_a_session_of_own_code_needs_the_study_in_its_new_place_and_its_holograms_are_those_of_the_export(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_of_own_code_needs_its_study_and_has_the_holograms_of_the_export(tmp_path, monkeypatch):
     session = moved(tmp_path, monkeypatch, OWN)
     _, failure = run("session", "import", session)
-    for missing in ("path: images", "own.py:Elsewhere", "dataset: folder", "give --study"):
+    for missing in ("path: images", "own.py:elsewhere", "dataset: folder", "give --study"):
         assert missing in failure
     assert "benches" not in failure
 

@@ -1,22 +1,19 @@
 """Studies with the fake trained methods: their configs, their runs, and what a command line says of them."""
 
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holobench_eval.commands import main
 from holobench_eval.study.artifacts import Artifacts
-from holobench_eval.study.config import load_study
 from holobench_eval.study.displays import Preparation
-from holobench_eval.study.executors import Serial
-from holobench_eval.study.plan import plan
-from holobench_eval.study.running.progress import Lines
-from holobench_eval.study.running.run import Outcome, run
-from tests.support import fake_trained
+from holobench_eval.study.running.run import Outcome
+from tests.commands import test_commands
+from tests.study import studies
+from tests.study.studies import exchanged, planned
+from tests.support.studies import fake_trained
 
 CONFIG = """\
 title: "Trained"
@@ -28,22 +25,27 @@ methods: ["trained.py:Gain"]
 """
 
 
+INSIDE = ("seed: 3", "seed: 3\nisolation: none")
+"""Where what runs in a process of its own is no matter, which takes longer."""
+
+
 def write(folder: Path, *changes: tuple[str, str]) -> Path:
     """A config and the plug-ins it names, with pieces of the config exchanged."""
     shutil.copy(fake_trained.__file__, folder / "trained.py")
-    text = CONFIG
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
     path = folder / "study.yaml"
-    path.write_text(text)
+    path.write_text(exchanged(CONFIG, *changes))
     return path
+
+
+def write_inside(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The same of a study whose methods run inside."""
+    return write(folder, INSIDE, *changes)
 
 
 def compute(config: Path, output: str = "out", write: Callable[[str], None] = print, **options: Any) -> Outcome:
     """Run a study in this process; artifacts are beside its config."""
-    study, folder = load_study(config), config.parent
-    return run(study, plan(study), folder / output, Serial(), Lines(write), 1, folder / "artifacts", **options)
+    folder = config.parent
+    return studies.compute(config, folder / output, write, artifacts=folder / "artifacts", **options)
 
 
 def computed(config: Path) -> list[dict[str, Any]]:
@@ -57,7 +59,7 @@ def computed(config: Path) -> list[dict[str, Any]]:
 
 def needs(config: Path) -> list[Preparation]:
     """What has to be learned for a study."""
-    return list(plan(load_study(config)).preparations().values())
+    return list(planned(config).preparations().values())
 
 
 def artifact_of(config: Path) -> Path:
@@ -75,12 +77,8 @@ def rounds(folder: Path) -> list[int]:
 def holoeval(patch: pytest.MonkeyPatch, config: Path, *options: str) -> int:
     """The exit code of ``holoeval run``."""
     folder = config.parent
-    command = ["holoeval", "run", str(config), "--executor", "serial", "--output", str(folder / "out")]
-    patch.setattr(sys, "argv", [*command, "--artifacts", str(folder / "artifacts"), *options])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    code = stopped.value.code
-    return code if isinstance(code, int) else 0
+    places = "--output", folder / "out", "--artifacts", folder / "artifacts"
+    return test_commands.holoeval(patch, "run", config, "--executor", "serial", *places, *options)
 
 
 def assert_refused(code: int, printed: Any, *words: str) -> None:

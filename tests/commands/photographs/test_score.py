@@ -23,7 +23,7 @@ from holobench_eval.study.folders.files import read_folders
 from tests.support.photographed import captured, few, photograph, pose, save
 from tests.support.reports import whole
 
-REAL = Path(__file__).resolve().parents[2] / "../shared/captures/stanford-2021"
+REAL = Path(__file__).resolve().parents[3] / "../shared/captures/stanford-2021"
 PUBLISHED = {"sgd-asm": 20.94, "citl-asm": 25.16, "sgd-ours": 27.41}
 SHAPE = (160, 200)
 SPECKLE = {"clean": 0.2, "coarse": 0.6}
@@ -51,6 +51,11 @@ def records(root: Path) -> list[Path]:
     return sorted(path for path in (root / "out" / "records").glob("*.json") if not path.name.startswith("alignment"))
 
 
+def table(root: Path) -> pd.DataFrame:
+    """The records by method and target."""
+    return pd.read_csv(root / "out" / "records.csv").set_index(["label", "target"])
+
+
 def quiet() -> Console:
     return Console(file=io.StringIO())
 
@@ -67,6 +72,7 @@ def scored(tmp_path_factory):
 @pytest.fixture
 def quick(monkeypatch):
     monkeypatch.setattr(scored_pictures, "score", few)
+    monkeypatch.setattr(scored_pictures, "second_warp", lambda _frame, _reference, first: first)
 
 
 @pytest.fixture
@@ -80,9 +86,8 @@ def test_the_report_says_where_the_geometry_came_from_and_has_no_word_of_display
     root, text = scored
     for said in ("not from fiducials", "One shared alignment for 4 captures", "## Alignment", "## Paired tests"):
         assert said in text
-    for word in ("simulated", "panel", "profile", "Seconds", "Holograms of a circle grid", "yaml", "phase pattern"):
-        assert word not in text
-    assert "linear light [dB]" not in text  # of values as they are stored
+    words = ("simulated", "panel", "profile", "Seconds", "Holograms of a circle grid", "yaml", "phase pattern")
+    assert not [word for word in (*words, "linear light [dB]") if word in text]  # values are as they are stored
     for method in SPECKLE:
         for name in ("astronaut", "coffee"):
             file = root / "out" / "figures" / f"alignment-{method}-{name}.jpg"
@@ -91,10 +96,10 @@ def test_the_report_says_where_the_geometry_came_from_and_has_no_word_of_display
 
 
 def test_the_cleaner_pictures_score_higher_and_the_tables_say_that_they_are_of_given_pictures(scored):
-    table = pd.read_csv(scored[0] / "out" / "table.csv", index_col="label")
-    assert table.loc["clean", "psnr_stored_db"] > table.loc["coarse", "psnr_stored_db"] + 1
-    assert table.loc["clean", "n"] == 2
-    assert not any("linear" in column for column in table)
+    rows = pd.read_csv(scored[0] / "out" / "table.csv", index_col="label")
+    assert rows.loc["clean", "psnr_stored_db"] > rows.loc["coarse", "psnr_stored_db"] + 1
+    assert rows.loc["clean", "n"] == 2
+    assert not any("linear" in column for column in rows)
     text = (scored[0] / "out" / "records.csv").read_text()
     cells = pd.read_csv(io.StringIO(text))
     assert (set(cells["study"]), set(cells["measure"])) == ({"out"}, {"files"})
@@ -125,10 +130,10 @@ def test_an_interrupted_run_goes_on(pictures, monkeypatch, quick):
 
 def test_a_changed_capture_is_scored_anew(pictures, quick):
     path = pictures / "captures" / "coarse" / "coffee.png"
-    before = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["psnr_stored_db"]
+    before = table(pictures)["psnr_stored_db"]
     Image.open(path).convert("L").convert("RGB").save(path)
     run(pictures)
-    after = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["psnr_stored_db"]
+    after = table(pictures)["psnr_stored_db"]
     assert after["coarse", "coffee"] != before["coarse", "coffee"]
     assert after["clean", "astronaut"] == pytest.approx(before["clean", "astronaut"], abs=0.5)
 
@@ -144,7 +149,7 @@ def test_a_capture_of_another_picture_and_a_lacking_one_are_holes_that_are_told(
     text = whole(pictures / "out" / "report.md")
     assert "the target is not found in the capture" in text
     assert "is the same picture as" in text
-    cells = pd.read_csv(pictures / "out" / "records.csv")
+    cells = table(pictures)
     holes = cells[cells["state"] != "done"]
     assert sorted(holes["state"]) == ["failed", "missing"]
     assert holes["psnr_stored_db"].isna().all()
@@ -157,8 +162,7 @@ def test_gray_and_colour_do_not_mix_and_gray_alone_is_scored(pictures, quick):
     assert "the capture is gray and the target is in colour" in text
     assert "the capture is in colour and the target gray" in text
     assert "scale_0" in (pictures / "out" / "table.csv").read_text()
-    states = pd.read_csv(pictures / "out" / "records.csv").set_index(["label", "target"])["state"]
-    assert states["clean", "astronaut"] == "done"
+    assert table(pictures)["state"]["clean", "astronaut"] == "done"
 
 
 @pytest.mark.parametrize(("values", "key"), [("srgb", "psnr_linear"), ("linear", "psnr_amplitude")])
@@ -240,10 +244,7 @@ def test_what_is_suspicious_is_noted(tmp_path):
 
 def test_wrong_choices_are_named(scored):
     root = scored[0]
-    for options, line in (
-        ({"values": "gamma"}, "allowed: linear, srgb"),
-        ({"baseline": "cleen"}, "did you mean 'clean'"),
-    ):
+    for options, line in (({"values": "gamma"}, "allowed: linear, srgb"), ({"baseline": "cleen"}, "you mean 'clean'")):
         with pytest.raises(UserError, match=line):
             run(root, **options)
     with pytest.raises(UserError, match="would mix with"):
