@@ -1,7 +1,6 @@
-"""Two runs are read, and compared cell by cell."""
+"""Two runs are read, compared cell by cell, and written as a page."""
 
-from __future__ import annotations
-
+import csv as reader
 import io
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pandas as pd
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.report.compare.page import csv, markdown
 from holobench_eval.report.compare.paired import Comparison, Unpaired, compare, provenance_differences, read_run
 from holobench_eval.report.data.statistics import family_p, mean_interval
 from holobench_eval.report.data.tables import csv_text
@@ -31,12 +31,9 @@ def test_only_facts_that_differ_are_listed(tmp_path: Path) -> None:
     ]
 
 
-def test_a_folder_without_records_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_records_is_refused_and_a_cell_that_is_there_twice_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"no records\.csv in this folder; expected the folder of a report"):
         read_run(tmp_path)
-
-
-def test_a_cell_that_is_there_twice_is_named(tmp_path: Path) -> None:
     path = write_report(tmp_path, SCORES) / "records.csv"
     path.write_text(path.read_text() + path.read_text().splitlines()[1] + "\n")
     with pytest.raises(UserError, match=r"two rows for one cell \(toy, bench, t0\)"):
@@ -82,17 +79,14 @@ def test_regressions_come_first_the_largest_before_the_others_and_equal_rows_las
     assert [row.method for row in comparison.regressions(1.1)] == ["far down"]
 
 
-def test_less_is_better_where_the_score_says_so(tmp_path: Path) -> None:
+def test_less_is_better_where_the_score_says_so_and_two_clusters_give_no_verdict(tmp_path: Path) -> None:
     """FLIP of these records falls where PSNR rises."""
+    few = compared(tmp_path, {("m", "d"): BASE[:2]}, {("m", "d"): [1.0, 1.0]})
+    assert few.rows[0].verdict == "too few clusters"
+    assert few.regressions(0) == []
     comparison = compared(tmp_path, {("m", "d"): BASE}, {("m", "d"): shifted(1)}, metric="flip_srgb")
     assert comparison.rows[0].change.mean < 0
     assert comparison.rows[0].verdict == "better"
-
-
-def test_two_clusters_give_no_verdict(tmp_path: Path) -> None:
-    comparison = compared(tmp_path, {("m", "d"): BASE[:2]}, {("m", "d"): [1.0, 1.0]})
-    assert comparison.rows[0].verdict == "too few clusters"
-    assert comparison.regressions(0) == []
 
 
 def test_displays_of_other_names_are_paired_where_they_are_stated(tmp_path: Path) -> None:
@@ -178,3 +172,53 @@ def test_what_cannot_be_compared_is_one_line(tmp_path: Path, b: Scores, options:
     with pytest.raises(UserError, match=message) as error:
         compared(tmp_path, {("m", "d"): BASE, ("m", "x"): BASE}, b, **options)
     assert "\n" not in str(error.value)
+
+
+A, B = [20.0, 21.0, 22.0], [20.5, 21.4, 22.6]
+HOSTILE = ("<script>alert(1)</script>", "a | b", "=cmd()", "[x](http://example.org)", "*bold*")
+
+
+def of_methods(folder: Path, *names: str) -> Comparison:
+    runs = (
+        read_run(write_report(folder / run, {(name, "bench"): values for name in names}, {"revision": run}))
+        for run, values in (("a", A), ("b", B))
+    )
+    return compare(*runs)
+
+
+def test_markdown_and_csv_have_the_same_numbers_and_the_page_says_what_differs_besides(tmp_path: Path) -> None:
+    comparison = of_methods(tmp_path, "toy")
+    text, row = markdown(comparison), next(reader.DictReader(io.StringIO(csv(comparison))))
+    mean, low, high = (float(row[f"difference{end}"]) for end in ("", "_low", "_high"))
+    assert f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]" in text
+    assert (row["unit"], row["targets"], row["verdict"]) == ("dB", "3", "better")
+    assert float(row["mean_b"]) - float(row["mean_a"]) == pytest.approx(mean, abs=1e-3)
+    assert "| revision | a | b |" in text
+    assert "| t2 | toy | bench | 22.00 | 22.60 | +0.600 |" in text
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_name_stays_text(tmp_path: Path, name: str) -> None:
+    comparison = of_methods(tmp_path, name)
+    text = markdown(comparison)
+    assert "<script>" not in text
+    assert "[x](http" not in text
+    assert "*bold*" not in text.replace("\\*", "")
+    table = text[text.index("| method") :].split("\n\n")[0].splitlines()
+    assert {line.replace("\\|", "").count("|") for line in table} == {8}
+    cell = next(reader.DictReader(io.StringIO(csv(comparison))))["method"]
+    assert cell.lstrip("'") == name
+    assert not cell.startswith("=")
+
+
+@pytest.mark.parametrize("protocols", [("v1", "v2"), ("v2", "v2")])
+def test_scores_of_two_protocols_are_never_compared_without_a_word(tmp_path: Path, protocols: tuple[str, str]) -> None:
+    runs = []
+    for run, protocol in zip("ab", protocols, strict=True):
+        folder = write_report(tmp_path / run, {("toy", "bench"): A})
+        records = (folder / "records.csv").read_text().splitlines()
+        lines = [records[0], *(f"{line.rpartition(',')[0]},{protocol}" for line in records[1:])]
+        (folder / "records.csv").write_text("\n".join(lines) + "\n")
+        runs.append(read_run(folder))
+    text = markdown(compare(*runs))
+    assert ("A is scored by metric protocol v1 and B by v2." in text) == (protocols[0] != protocols[1])
