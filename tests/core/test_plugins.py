@@ -1,16 +1,18 @@
-"""Methods from files."""
+"""Methods from files, and the command that installs a package."""
 
 import functools
 import gc
 import os
+import shlex
 import sys
 import weakref
 from pathlib import Path
 
 import pytest
 
-from holobench_eval.core import plugins
+from holobench_eval.core import installed, plugins
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.installed import as_typed, clone, installing, shipped_configs
 
 METHOD = """
 import dataclasses
@@ -47,9 +49,7 @@ def test_equal_files_in_two_folders_are_two_modules(tmp_path: Path) -> None:
     assert first is not second
 
 
-def test_a_file_that_was_edited_is_imported_again_and_never_from_bytecode(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_was_edited_is_imported_again_and_never_from_bytecode(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     file = tmp_path / "mine.py"
     for number in (1, 2):  # equal size and equal time, which is all that bytecode is checked by
@@ -60,6 +60,7 @@ def test_a_file_that_was_edited_is_imported_again_and_never_from_bytecode(
 
 ABOUT_ITSELF = """
 from __future__ import annotations
+
 from dataclasses import InitVar, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -83,9 +84,7 @@ class Mine:
 """
 
 
-def test_a_file_knows_where_it_lies_and_has_lists_and_init_variables_beside_annotations_for_types_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_knows_where_it_lies_and_has_lists_and_init_variables(tmp_path: Path, monkeypatch) -> None:
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "mine.py").write_text(ABOUT_ITSELF)
     monkeypatch.chdir(tmp_path / "inner")
@@ -108,9 +107,7 @@ def test_a_function_that_is_set_on_a_method_is_called_without_the_method(tmp_pat
         ("*args", "method 'mine.py:f': '*args' takes any parameters; name each of them"),
     ],
 )
-def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(
-    tmp_path: Path, parameter: str, message: str
-) -> None:
+def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(tmp_path: Path, parameter, message) -> None:
     (tmp_path / "mine.py").write_text(f"def f(target, bench, {parameter}): ...\n")
     with pytest.raises(UserError) as found:
         plugins.find("methods", "mine.py:f", tmp_path)
@@ -124,9 +121,7 @@ def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(
         "import dataclasses\n@dataclasses.dataclass\nclass f:\n    def solve(self, bench, target): ...\n",
     ],
 )
-def test_a_method_that_takes_its_arguments_in_the_other_order_is_refused_when_it_is_loaded(
-    tmp_path: Path, text: str
-) -> None:
+def test_a_method_that_takes_its_arguments_in_the_other_order_is_refused_when_it_is_loaded(tmp_path, text) -> None:
     (tmp_path / "mine.py").write_text(text)
     with pytest.raises(UserError, match=r"'mine.py:f' takes bench and target in this order; expected \(target, bench"):
         plugins.find("methods", "mine.py:f", tmp_path)
@@ -150,3 +145,39 @@ def test_a_method_that_turns_anothers_arguments_round_is_no_swapped_one() -> Non
     plugins.refuse_swapped(ours, "ours")
     with pytest.raises(UserError, match="theirs takes bench and target"):
         plugins.refuse_swapped(theirs, "theirs")
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a space that holds the studies of a package, as a wheel installs it."""
+    configs = tmp_path / "the place" / "configs"
+    configs.mkdir(parents=True)
+    (configs / "constraints.txt").touch()
+    monkeypatch.setattr(installed, "shipped", lambda: configs)
+    monkeypatch.chdir(tmp_path)
+    return configs.parent
+
+
+def test_of_a_wheel_the_constraints_that_travel_with_it_are_named(place: Path) -> None:
+    constraints = place / "configs" / "constraints.txt"
+    assert clone() is None
+    assert shlex.split(installing(extra="peers")) == ["pip", "install", "-c", str(constraints), "holobench_eval[peers]"]
+    assert shlex.split(installing("kornia")) == ["pip", "install", "-c", str(constraints), "kornia"]
+    assert shlex.split(installing())[-1] == "holobench_eval"
+
+
+def test_in_a_clone_the_command_is_that_of_the_documentation(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("pyproject.toml", "constraints.txt"):
+        (place / name).touch()
+    assert clone() == place
+    constraints = ["-c", str(place / "constraints.txt")]
+    assert shlex.split(installing(extra="peers")) == ["pip", "install", *constraints, "-e", f"{place}[peers]"]
+    monkeypatch.chdir(place)
+    assert installing(extra="peers") == "pip install -c constraints.txt -e '.[peers]'"
+    assert installing("kornia") == "pip install -c constraints.txt kornia"
+    assert installing() == "pip install -c constraints.txt -e ."
+
+
+def test_a_config_that_ships_is_typed_by_its_name_and_another_by_its_path() -> None:
+    assert as_typed(shipped_configs()["table3"]) == "table3"
+    assert as_typed(Path("elsewhere/table3.yaml")) == "elsewhere/table3.yaml"

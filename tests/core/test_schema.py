@@ -1,23 +1,35 @@
-"""One function checks every mapping that comes from a file, whatever the file is."""
+"""Files that anybody may have written: one function checks every mapping, and every command reads them in one way."""
 
 import itertools
+import os
+import warnings
+import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pytest
+import torch
 from annotated_types import Interval
 from hypothesis import given
 from hypothesis import strategies as st
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.io import read_regular, read_text
 from holobench_eval.core.schema import FieldError, Metres, checked, kinds_of, metres, placed, typed
-from holobench_eval.core.yaml_source import parse
+from holobench_eval.core.yaml_source import LARGEST_BYTES, load, parse
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import Profile
+from holobench_eval.interactive import load_records
 from holobench_eval.lab.bench_file import BenchFile, load_bench_file
+from holobench_eval.report.compare.paired import read_run
+from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study
+from holobench_eval.study.running import provenance
+from holobench_eval.study.store import Store
+from tests.support.records_on_disk import write_report
 
 
 @dataclass(frozen=True)
@@ -49,15 +61,10 @@ class Table:
         (
             {"lenses": [{}, {"size": [1]}]},
             ("lenses", 1, "size", 1),
-            "table 'x' needs the parameter 'lenses.1",
+            "table 'x' needs the parameter 'lenses",
             "lenses[1]",
         ),
-        (
-            {"lens": {"focus": 0}},
-            ("lens", "focus"),
-            "table 'x': parameter 'lens.focus': input should be",
-            "lens.focus sh",
-        ),
+        ({"lens": {"focus": 0}}, ("lens", "focus"), "table 'x': parameter 'lens.focus': input", "lens.focus sh"),
     ],
 )
 def test_a_fault_is_one_line_with_its_place_in_the_words_of_its_owner(data, where, of_a_plug_in, of_a_file):
@@ -180,3 +187,150 @@ def test_a_file_of_another_kind_is_refused_for_its_kind(kind: str, wanted: str, 
 def test_each_kind_is_that_of_its_own_keys() -> None:
     for kind, cls in zip(READERS, (Study, BenchFile, Profile), strict=True):
         assert kinds_of(cls.__dataclass_fields__)[0] == kind
+
+
+def test_every_key_and_value_knows_its_place() -> None:
+    document = parse("a.yaml", "one: 1\ntwo:\n  - three\n  - {four: 5}\n")
+    assert document.data == {"one": 1, "two": ["three", {"four": 5}]}
+    assert document.keys[("two",)] == (2, 1)
+    assert document.values[("two", 0)] == (3, 5)
+    assert document.keys[("two", 1, "four")] == (4, 6)
+    assert document.values[("two", 1, "four")] == (4, 12)
+    absent = document.error(("two", 1, "missing", 4), "what")
+    assert str(absent) == "a.yaml:4:5: what"  # the place of what encloses it
+
+
+def test_scalars_follow_the_core_schema() -> None:
+    document = parse("a.yaml", "{a: 1e-3, b: yes, c: 010, d: 1:30, e: 2020-01-01, f: ~, g: .5, h: True, i: '1'}")
+    assert list(document.data.values()) == [0.001, "yes", 10, "1:30", "2020-01-01", None, 0.5, True, "1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.yaml:1:1: the file is empty"),
+        ("- 1", "a.yaml:1:1: the file is not a mapping"),
+        ("a: 1\nb: 2\na: 3", "a.yaml:3:1: duplicate key 'a'; first given in line 1"),
+        ("a: &x 1\nb: *x", "a.yaml:2:4: aliases"),
+        ("a: .nan", "a.yaml:1:4: '.nan' is not a finite number"),
+        ("a: 1e999", "a.yaml:1:4: '1e999' is not a finite number"),
+        ("a: !!python/object:os.system {}", "a.yaml:1:4: values of the kind"),
+        ("? [1]\n: 2", "a.yaml:1:3: a key must be a plain word"),
+        ("a: 1\n---\nb: 2", "a.yaml:2:1: expected a single document"),
+        ("a: [1", "a.yaml:1:6: while parsing a flow sequence"),
+        ("a: " + "[" * 1000, "a.yaml:1:23: nested deeper than 20 levels"),
+        ("a: \x07", "a.yaml: not YAML: unacceptable character"),
+    ],
+)
+def test_a_faulty_document_is_one_line_with_its_place(text: str, message: str) -> None:
+    with pytest.raises(UserError) as caught:
+        parse("a.yaml", text)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_alias_bomb_is_refused_at_its_first_alias() -> None:
+    lines = ["a0: &a0 [x, x]"] + [f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]" for i in range(1, 50)]
+    with pytest.raises(UserError, match=r"^a\.yaml:2:"):
+        parse("a.yaml", "\n".join(lines))
+
+
+def test_files_that_are_no_configs_are_refused(tmp_path: Path) -> None:
+    large, binary = tmp_path / "large.yaml", tmp_path / "binary.yaml"
+    large.write_text("a: " + "x" * LARGEST_BYTES)
+    binary.write_bytes(b"\xff\xfe")
+    for path, message in (
+        (tmp_path / "absent.yaml", "no such file"),
+        (tmp_path, "Is a directory"),
+        (large, "larger than"),
+        (binary, "no YAML, since not UTF-8 text"),
+    ):
+        with pytest.raises(UserError, match=message):
+            load(path)
+
+
+@given(st.text(max_size=80))
+def test_any_text_gives_a_mapping_or_one_line(text: str) -> None:
+    assert isinstance(outcome(text), dict) or "\n" not in str(outcome(text))
+
+
+def outcome(text: str) -> object:
+    try:
+        return parse("a.yaml", text).data
+    except UserError as error:
+        return str(error)
+
+
+COMMANDS: dict[str, tuple[str, Callable[[Path], Any]]] = {
+    "a config": ("file", load_study),
+    "any YAML": ("file", load),
+    "records of a run": ("records.csv", lambda path: read_run(path.parent)),
+    "records in Python": ("records.csv", lambda path: load_records(path.parent)),
+    "a provenance": ("provenance.json", lambda path: provenance.read(path.parent)),
+    "a record": ("file.json", lambda path: Store(path.parents[1]).read("file")),
+    "tensors": ("file", read_tensors),
+}
+
+
+@pytest.mark.parametrize("reader", COMMANDS)
+@pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
+def test_a_file_that_is_none_or_is_huge_is_refused_at_once(reader: str, kind: str, tmp_path: Path) -> None:
+    name, read = COMMANDS[reader]
+    path = tmp_path / "records" / name
+    path.parent.mkdir()
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with path.open("wb") as file:
+            file.truncate(10**11)  # sparse: it takes no room
+    with pytest.raises(UserError) as caught:
+        read(path)
+    assert str(path) in str(caught.value)
+    assert ("larger than" if kind == "huge" else "a pipe or a device; expected a regular file") in str(caught.value)
+
+
+def test_a_file_is_read_up_to_its_limit_and_closed(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes("a\r\né\n".encode())
+    with warnings.catch_warnings(record=True) as said:  # of files that stay open
+        warnings.simplefilter("always")
+        assert read_regular(path, 6) == path.read_bytes()
+        assert read_text(path, 6) == "a\né\n"
+    assert not said
+    with pytest.raises(UserError, match="larger than"):
+        read_regular(path, 5)
+    path.write_bytes(b"a\xff")
+    with pytest.raises(UserError, match=r"file: not UTF-8 text \(invalid start byte at byte 1\)"):
+        read_text(path, 6)
+
+
+def test_tensors_that_would_be_unpacked_to_more_than_the_file_are_refused(tmp_path: Path) -> None:
+    plain, packed = tmp_path / "plain.pt", tmp_path / "packed.pt"
+    torch.save({"x": torch.zeros(100_000)}, plain)
+    assert torch.equal(read_tensors(plain)["x"], torch.zeros(100_000))
+    with zipfile.ZipFile(plain) as source, zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as target:
+        for entry in source.infolist():
+            target.writestr(entry.filename, source.read(entry))
+    with pytest.raises(UserError, match=r"packed\.pt: damaged, or .* unpacked to"):
+        read_tensors(packed)
+
+
+@pytest.mark.parametrize("sign", ["\x1b[2J", "\u202e"])
+@pytest.mark.parametrize("column", ["label", "condition", "target", "reason"])
+def test_records_that_would_control_a_terminal_are_refused(column: str, sign: str, tmp_path: Path) -> None:
+    folder = write_report(tmp_path, {("toy", "bench"): [None, 20.0]})
+    path, value = folder / "records.csv", {"label": "toy", "condition": "bench", "target": "t0", "reason": "no light"}
+    path.write_text(path.read_text().replace(value[column], value[column] + sign))
+    with pytest.raises(UserError, match="holds control characters; take them out") as caught:
+        read_run(folder)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("text", ['title: "a\\e[2Jb"', '"a\\u202E": 1', 'methods: [{label: "a\\x9b"}]'])
+def test_a_config_that_would_control_a_terminal_is_refused_at_its_place(text: str) -> None:
+    with pytest.raises(UserError, match=r"a\.yaml:1:\d+: .* holds control characters; take them out") as caught:
+        parse("a.yaml", text)
+    assert str(caught.value).isprintable()
+    assert parse("a.yaml", 'note: "two\\n\\tlines"').data == {"note": "two\n\tlines"}

@@ -1,3 +1,6 @@
+"""Light fields: what moves in a view, by how much and which way, and that the light of a display moves as it does."""
+
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -7,10 +10,13 @@ import torch
 from torch import Tensor
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.datasets import focal_stacks, shipped
+from holobench_eval.datasets import focal_stacks, shipped, still_life
 from holobench_eval.datasets.defocus import blurred, defocus
 from holobench_eval.datasets.focal_stacks import BLUR, FocalStacks
+from holobench_eval.datasets.light_fields import PUPIL, LightFields
 from holobench_eval.display import load_profile
+from holobench_eval.display.simulated.changes import altered, kinds
+from holobench_eval.display.simulated.pipeline import SimulatedBench
 
 SHAPE = (96, 96)
 
@@ -50,14 +56,11 @@ def test_blur_grows_with_the_distance_from_the_plane():
         assert found[-1] < 0.5 * found[0]
 
 
-def test_the_blur_is_that_of_the_cone_which_the_iris_passes():
+def test_the_blur_is_that_of_the_cone_which_the_iris_passes_and_a_disc_has_its_width():
     panel = load_profile("leto-aged").panel
     cone = panel.pupil * panel.wavelengths[1] / panel.pitch
     height = panel.region * panel.shape[0] * panel.pitch
     assert pytest.approx(1e-3 * cone / height, rel=1e-2) == BLUR
-
-
-def test_a_disc_has_the_width_asked_for():
     point = np.zeros((41, 41, 1), np.float32)
     point[20, 20] = 1
     for radius in (2.0, 5.5, 9.0):
@@ -95,29 +98,23 @@ def test_a_slope_has_no_seams_between_its_layers():
     assert shown[:, 12:].min() > 0.895
 
 
-def test_a_stack_is_the_same_picture_on_a_larger_panel():
-    small, large = (FocalStacks().load("shapes@0mm", shape) for shape in (SHAPE, (192, 192)))
-    assert (torch.nn.functional.avg_pool2d(large, 2) - small).abs().mean() < 0.02
-
-
-def test_an_item_tells_its_scene_and_its_plane_and_scenes_differ_by_their_number_alone():
+def test_an_item_tells_its_scene_and_plane_and_is_the_same_picture_on_a_larger_panel():
     stacks = FocalStacks(("shapes", "shapes-2"), (-1.5, 0.0))
     assert stacks.items() == ["shapes@-1.5mm", "shapes@0mm", "shapes-2@-1.5mm", "shapes-2@0mm"]
     assert (stacks.scene("shapes-2@-1.5mm"), stacks.plane("shapes-2@-1.5mm")) == ("shapes-2", -1.5)
     first, second = (stacks.load(f"{scene}@0mm", SHAPE) for scene in ("shapes", "shapes-2"))
     assert (first - second).abs().mean() > 0.05
     assert torch.equal(first, FocalStacks(planes=(0.0,)).load("shapes@0mm", SHAPE))
+    small, large = (FocalStacks().load("shapes@0mm", shape) for shape in (SHAPE, (192, 192)))
+    assert (torch.nn.functional.avg_pool2d(large, 2) - small).abs().mean() < 0.02
 
 
-def test_a_plane_where_nothing_is_in_focus_is_refused():
-    assert "nothing within 0.5 mm of the plane at 5 mm" in refused(FocalStacks(planes=(5.0,)).items)
-
-
-def test_a_motorcycle_that_is_not_there_is_said_to_be_missing(monkeypatch, tmp_path):
+def test_a_scene_that_is_not_there_and_a_plane_without_any_of_it_are_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(shipped, "files", lambda _: tmp_path)
     message = refused(FocalStacks(("motorcycle",)).items)
     assert "motorcycle_left.png and motorcycle_disp.npz not in the installed scikit-image" in message
     assert "install scikit-image 0.26.0" in message
+    assert "nothing within 0.5 mm of the plane at 5 mm" in refused(FocalStacks(planes=(5.0,)).items)
 
 
 def test_holes_of_a_disparity_map_belong_to_the_background():
@@ -161,3 +158,68 @@ def test_a_folder_with_an_image_and_its_depth_is_a_scene(tmp_path, kind):
 )
 def test_a_folder_whose_depth_cannot_be_used_is_refused(tmp_path, depth, words):
     assert words in refused(write_scene(tmp_path / "room", depth).items)
+
+
+def test_the_view_of_the_middle_is_the_picture_of_an_eye_with_that_pupil() -> None:
+    (middle,) = LightFields(places=(0.0,)).items()
+    stack = FocalStacks(planes=(0.0,), near=10, far=-10, blur=BLUR * PUPIL)
+    assert torch.equal(LightFields(places=(0.0,)).load(middle, SHAPE), stack.load("shapes@0mm", SHAPE))
+    assert PUPIL == kinds.PUPIL
+
+
+@pytest.mark.parametrize("parallax", [-0.1, 0.06])
+def test_every_point_of_a_scene_moves_by_its_depth_and_what_is_near_hides_what_is_far(parallax: float) -> None:
+    still, height = 0.5, 200
+    before, after = (still_life.still_life("shapes", (height, height), by, still) for by in (0.0, parallax))
+    rows, columns = np.mgrid[:height, :height]
+    nearness = before[1]
+    seen = np.rint(columns - parallax * (nearness - still) * height).astype(int)
+    inside = (seen >= 0) & (seen < height)
+    there = after[1][rows[inside], seen[inside]]
+    same = np.abs(there - nearness[inside]) < 0.02
+    assert same.mean() > 0.9  # the rest is hidden now
+    assert (there[~same] > nearness[inside][~same]).mean() > 0.8  # by what is nearer; others stand at edges
+    colours = np.abs(after[0][rows[inside], seen[inside]] - before[0][inside])[same]
+    assert np.median(colours) < 0.01
+
+
+@pytest.mark.parametrize("place", [-0.5, 0.5])
+def test_a_point_before_the_picture_moves_on_a_display_as_in_the_light_field(place: float) -> None:
+    profile = load_profile("ideal")
+    profile = replace(profile, panel=replace(profile.panel, wavelengths=(517e-9,)))
+    spec = profile.spec((192, 192))
+    away = 10 * spec.distance / profile.panel.distance  # mm nearer to the viewer, on this panel
+    lens = focused(replace(spec, distance=spec.distance + away * 1e-3))
+    shift = centroid(eye(profile, place).image(lens)) - centroid(eye(profile, 0.0).image(lens))
+    height = spec.region.shape[0]
+    assert shift == pytest.approx(-place * BLUR / 2 * 10 * height, rel=0.1)
+
+
+def focused(spec) -> Tensor:
+    """The phase ``(1, H, W)`` of a lens that gathers the light of the panel in its distance."""
+    y, x = (torch.arange(n, dtype=torch.float64) - (n - 1) / 2 for n in spec.shape)
+    squared = (y[:, None] ** 2 + x**2) * spec.pitch**2
+    return (-torch.pi * squared / (spec.wavelengths[0] * spec.distance)).remainder(2 * torch.pi)[None].float()
+
+
+def eye(profile, place: float) -> SimulatedBench:
+    return SimulatedBench(altered(profile, "eye_pupil", f"{place:g}").scaled((192, 192)))
+
+
+def centroid(image: Tensor) -> float:
+    """Column in which the middle of the light lies [px]."""
+    light = image[0].sum(0)
+    return float((light * torch.arange(len(light))).sum() / light.sum())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"scenes": ("motorcycle",)}, "scene 'motorcycle' has one view; allowed: shapes, shapes-2, shapes-3 ..."),
+        ({"places": (0.5, 0.5000001)}, "place '0.5' is given twice"),
+        ({"near": -10.0}, "near is to be larger than far"),
+    ],
+)
+def test_what_has_no_views_is_refused(change, words: str) -> None:
+    with pytest.raises(Exception, match="^" + words.replace(".", r"\.")):
+        LightFields(**change)

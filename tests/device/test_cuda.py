@@ -1,7 +1,5 @@
 """A GPU gives what the CPU gives, within stated tolerances; needs a GPU."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
@@ -113,9 +111,7 @@ class Loop(graphs.CudaGraph):
 
 
 @pytest.mark.parametrize("retrieval", RETRIEVALS)
-def test_iterations_are_replayed_with_the_bits_of_a_loop(
-    benches: dict[Any, CalibratedBench], retrieval: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_iterations_are_replayed_with_the_bits_of_a_loop(benches, retrieval, monkeypatch) -> None:
     name, params = RETRIEVALS[retrieval]
     method = plugins.build("methods", name, {"iterations": 20, **params}, Path())
     target, found = smooth((1, *benches[CUDA].spec.region.shape)).to(CUDA), []

@@ -48,7 +48,12 @@ def test_a_capture_is_the_images_frame_and_as_bright_as_a_scored_one(begin, work
     assert bench.light(images[0]).shape == (3,)
 
 
-def test_noise_depends_on_seed_image_and_names_and_on_nothing_else(begin, images):
+def test_noise_and_random_numbers_depend_on_seed_image_and_names_and_on_nothing_else(begin, images):
+    def draw(seed, name):
+        return float(torch.rand(1, generator=begin(seed=seed).generator(name)))
+
+    assert draw(3, "a") == draw(3, "a")
+    assert len({draw(3, "a"), draw(3, "b"), draw(4, "a")}) == 3
     bench = begin()
     first = bench.photograph(PHASE, images[0], "round", 0)
     bench.photograph(PHASE, images[1], "round", 0)
@@ -56,14 +61,6 @@ def test_noise_depends_on_seed_image_and_names_and_on_nothing_else(begin, images
     assert torch.equal(begin().photograph(PHASE, images[0], "round", 0), first)
     assert not torch.equal(bench.photograph(PHASE, images[0], "round", 1), first)
     assert not torch.equal(begin(seed=4).photograph(PHASE, images[0], "round", 0), first)
-
-
-def test_random_numbers_depend_on_seed_and_names(begin):
-    def draw(seed, name):
-        return float(torch.rand(1, generator=begin(seed=seed).generator(name)))
-
-    assert draw(3, "a") == draw(3, "a")
-    assert len({draw(3, "a"), draw(3, "b"), draw(4, "a")}) == 3
 
 
 def test_captures_without_a_gradient_are_counted_unless_refused_and_stop_at_the_budget(begin, images):

@@ -3,8 +3,6 @@
 ``python -m tests.golden.outputs`` adds what the file lacks, replaces what has a new version, and refuses the rest.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -32,17 +30,7 @@ from holobench_eval.study.opening import open_bench
 from holobench_eval.study.scoring.changed import changed_target, moved_phase
 from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
 from tests.support import photographed
-from tests.support.small_training import (
-    ROUNDS,
-    Memory,
-    modelled,
-    pictures,
-    quick,
-    small_spec,
-    solving_bench,
-    through_a_file,
-    training_bench,
-)
+from tests.support import small_training as small
 from tests.support.toy_camera import ToyDisplay, picture
 
 FILE = Path(__file__).with_name("outputs.json")
@@ -223,22 +211,24 @@ def _alignment() -> dict[str, Tensor]:
 
 
 # Retrieval with all terms of Eq. 22, through a network that shows what it is given.
-_RETRIEVAL = {"network": {"name": "identity"}, "training": ROUNDS, "start": {"iterations": 5, "offset": "none"}}
+_RETRIEVAL = {"network": {"name": "identity"}, "training": small.ROUNDS, "start": {"iterations": 5, "offset": "none"}}
 _RETRIEVAL["retrieval"] = {"iterations": 3, "step": 0.05}
 
 
 def _method(name: str) -> dict[str, Tensor]:
     """Phases of a method; where it is trained, also what it learned and predicts."""
-    method = quick(name)
+    method = small.quick(name)
     if name == "hil":
-        identity = _trained(plugins.build("methods", name, _RETRIEVAL), small_spec(192, 176))
-        return _trained(method, small_spec(48, 40, 3)) | {f"retrieval {key}": identity[key] for key in ("cos", "sin")}
+        identity = _trained(plugins.build("methods", name, _RETRIEVAL), small.small_spec(192, 176))
+        return _trained(method, small.small_spec(48, 40, 3)) | {
+            f"retrieval {key}": identity[key] for key in ("cos", "sin")
+        }
     if getattr(method, "trains", False):
-        return _trained(method, small_spec(48, 40, 3))
+        return _trained(method, small.small_spec(48, 40, 3))
     display, target = ToyDisplay(aberration=0.3, unmodulated=0.1, noise=0.02), picture()
     if name == "through":
-        display = replace(display, spec=modelled())
-        (target,) = pictures(display.spec)
+        display = replace(display, spec=small.modelled())
+        (target,) = small.pictures(display.spec)
     phase = method.solve(target[None], display.handle(method, target))
     found = _of_phase(phase)
     if getattr(method, "planes", False):
@@ -248,10 +238,10 @@ def _method(name: str) -> dict[str, Tensor]:
 
 
 def _trained(method: Any, spec: DisplaySpec) -> dict[str, Tensor]:
-    learned = through_a_file(dict(method.prepare(training_bench(spec, Memory(), images=2))))
+    learned = small.through_a_file(dict(method.prepare(small.training_bench(spec, small.Memory(), images=2))))
     found = {name: value.float() for name, value in _leaves("learned", learned)}
-    (target,) = pictures(spec, first=20)
-    handle = solving_bench(method, target, spec, learned)
+    (target,) = small.pictures(spec, first=20)
+    handle = small.solving_bench(method, target, spec, learned)
     phase = method.solve(target[None], handle)
     predicted = {"prediction": method.predict(phase, handle)} if hasattr(method, "predict") else {}
     return {**found, **_of_phase(phase), **predicted}

@@ -1,7 +1,5 @@
 """Numbers change with their declared version alone; what each case is lies in ``outputs.py``."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -89,9 +87,7 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
         ("method hybrid_model", _other_step),
     ],
 )
-def test_a_small_change_is_found(
-    name: str, change: Callable[[pytest.MonkeyPatch], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_small_change_is_found(name, change: Callable[[pytest.MonkeyPatch], None], monkeypatch) -> None:
     change(monkeypatch)
     problem = complaint(name, CASES[name], CASES[name].numbers(), recorded()[name])
     for words in (f"numbers of '{name}' changed", "raise its declared version", "`python -m tests.golden.outputs`"):

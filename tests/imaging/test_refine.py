@@ -1,3 +1,5 @@
+"""A small move is found and undone; phases become the levels of a real panel and back."""
+
 import math
 from itertools import product
 
@@ -11,6 +13,7 @@ from skimage import data
 from torch import Tensor
 
 from holobench_eval.imaging import refine
+from holobench_eval.imaging.convention import Convention
 from tests.support.benches.simulated_grid import random
 
 SIDE = 160
@@ -74,18 +77,13 @@ def test_a_turn_is_about_the_centre_of_a_target_of_any_shape(rows):
 
 
 @pytest.mark.parametrize("name", PICTURES)
-def test_an_aligned_pair_stays(name):
+def test_an_aligned_pair_stays_and_speckle_and_stray_light_leave_a_tenth_of_a_pixel(name):
     target = seen(PICTURES[name])
     noisy = target + 0.02 * torch.from_numpy(random("aligned", name).standard_normal(target.shape)).float()
     for capture in (target, 0.4 * target, noisy):
         found = refine(capture, target)
         assert math.hypot(found.dx, found.dy) < 0.02
         assert abs(found.theta) < 0.01
-
-
-@pytest.mark.parametrize("name", PICTURES)
-def test_speckle_and_stray_light_leave_a_tenth_of_a_pixel(name):
-    target = seen(PICTURES[name])
     for move in ((0.0, 0.0, 0.0), (0.6, -0.4, 0.0)):
         found = refine(speckled(seen(PICTURES[name], *move), (name, move)) + 0.05, target)
         assert (found.dx, found.dy) == pytest.approx(move[:2], abs=0.1)
@@ -109,8 +107,13 @@ def test_a_move_beyond_the_bounds_returns_the_capture_itself(move):
     assert (found.dx, found.dy, found.theta) == (0.0, 0.0, 0.0)
 
 
-def test_a_move_that_would_lower_the_correlation_is_not_taken():
-    """On this pair, hardly related, the linearised search ends 0.3 px off with a correlation of 0.494 for 0.495."""
+def test_what_is_unlike_or_would_be_less_alike_returns_the_capture_itself():
+    target = seen(PICTURES["coffee"])
+    flat = torch.full_like(target, 0.5)
+    ramp = torch.linspace(0, 1, SIDE).expand_as(target)
+    for capture, wanted in ((flat, target), (target, flat), (0 * flat, target), (ramp, ramp), (1 - target, target)):
+        assert torch.equal(refine(capture, wanted).image, capture)
+    # On this pair, hardly related, the linearised search ends 0.3 px off with a correlation of 0.494 for 0.495
     draw = random("unrelated", 445)
     share = 0.5 * draw.random()
     one, other = (cv2.GaussianBlur(draw.random((48, 48)), (0, 0), 1.5).astype(np.float32) for _ in range(2))
@@ -118,14 +121,6 @@ def test_a_move_that_would_lower_the_correlation_is_not_taken():
     found = refine(capture, torch.from_numpy(share * one + (1 - share) * other)[None])
     assert (found.dx, found.dy, found.theta) == (0.0, 0.0, 0.0)
     assert torch.equal(found.image, capture)
-
-
-def test_pictures_without_structure_or_relation_return_the_capture_itself():
-    target = seen(PICTURES["coffee"])
-    flat = torch.full_like(target, 0.5)
-    ramp = torch.linspace(0, 1, SIDE).expand_as(target)
-    for capture, wanted in ((flat, target), (target, flat), (0 * flat, target), (ramp, ramp), (1 - target, target)):
-        assert torch.equal(refine(capture, wanted).image, capture)
 
 
 def test_one_move_serves_all_channels():
@@ -144,3 +139,72 @@ def test_shapes_that_differ_are_refused():
         with pytest.raises(ValueError, match="above 16 px"):
             refine(torch.zeros(small), torch.zeros(small))
     assert refine(torch.zeros(1, 17, 17), torch.zeros(1, 17, 17)).image.shape == (1, 17, 17)
+
+
+PHASE = torch.linspace(-7, 7, 64 * 48).reshape(64, 48)
+
+conventions = st.builds(
+    Convention,
+    sign=st.sampled_from([1, -1]),
+    origin=st.floats(-4, 4),
+    two_pi_level=st.floats(40, 256),
+    flip_horizontal=st.booleans(),
+    flip_vertical=st.booleans(),
+)
+
+
+@given(conventions)
+def test_levels_stand_for_the_phase_to_half_a_level(convention):
+    back = convention.phase(convention.levels(PHASE))
+    error = torch.remainder(back - PHASE + math.pi, math.tau) - math.pi
+    between = convention.two_pi_level % 1  # where two pi is between two levels
+    assert float(error.abs().max()) <= math.tau / convention.two_pi_level * (1 if between else 0.505) + 1e-5
+
+
+whole = st.integers(40, 256).map(float)  # of others, a level may lie as near to a full turn as to level 0
+full_turns = st.one_of(whole, st.tuples(whole, whole, whole))
+maps = st.integers(0, 2**32 - 1).map(lambda seed: np.random.default_rng(seed).random((3, 8, 6)))
+
+
+@given(
+    st.builds(
+        Convention,
+        sign=st.sampled_from([1, -1]),
+        origin=st.floats(-4, 4),
+        two_pi_level=full_turns,
+        flip_horizontal=st.booleans(),
+        flip_vertical=st.booleans(),
+        turns=st.one_of(st.just(0.0), maps, maps.map(lambda each: each[0])),
+    )
+)
+def test_levels_of_three_lasers_come_back_whatever_the_convention_and_one_by_one_as_together(convention):
+    full = np.broadcast_to(np.array(convention.two_pi_level), 3)[:, None, None]
+    levels = np.random.default_rng(0).integers(0, np.floor(full).astype(int), (3, 8, 6)).astype(np.uint8)
+    phase = convention.phase(levels)
+    assert np.array_equal(convention.levels(phase), levels)
+    for channel in range(3):
+        alone = convention.of(channel)
+        assert np.array_equal(alone.levels(phase[channel]), levels[channel])
+        assert torch.equal(alone.phase(levels[channel]), phase[channel])
+
+
+def test_a_correction_is_added_modulo_a_turn_to_what_the_panel_gets():
+    turns = np.array([[0.25, 0.75]])
+    convention = Convention(two_pi_level=(200.0, 100.0), flip_horizontal=True, turns=turns)
+    phase = math.tau * torch.tensor([[[0.0, 0.5]], [[0.0, 0.5]]])
+    assert convention.levels(phase).tolist() == [[[150, 150]], [[75, 75]]]
+
+
+@pytest.mark.parametrize(("level", "says"), [(256.0, ""), (311.0, "18% of"), ((311.0, 256.0, 221.0), "18%, 0%, 0% of")])
+def test_a_full_turn_out_of_reach_has_a_line(level, says):
+    assert says in Convention(two_pi_level=level).out_of_reach
+    assert bool(Convention(two_pi_level=level).out_of_reach) == bool(says)
+
+
+def test_the_default_has_256_levels_to_two_pi_and_a_panel_of_less_goes_to_the_nearer_end():
+    levels = Convention().levels(torch.tensor([[0.0, math.pi, math.tau, -math.pi / 2]]))
+    assert levels.tolist() == [[0, 128, 0, 192]]
+    assert levels.dtype == np.uint8
+    short = Convention(two_pi_level=400)
+    levels = short.levels(torch.tensor([[0.0, math.tau * 250 / 400, math.tau * 300 / 400, math.tau * 390 / 400]]))
+    assert levels.tolist() == [[0, 250, 255, 0]]

@@ -1,4 +1,4 @@
-"""Counts without light: taken off in float, from a level or a file, and from nothing that does not fit."""
+"""Counts without light, and a bench file: what does not fit or cannot be is one line."""
 
 from pathlib import Path
 
@@ -28,9 +28,7 @@ def test_a_sample_below_the_dark_level_is_negative_and_does_not_wrap() -> None:
 
 @pytest.mark.parametrize("ending", [".tif", ".npy"])
 @pytest.mark.parametrize("kind", [np.uint16, np.float32])
-def test_a_dark_frame_or_the_mean_of_several_is_taken_off_sample_by_sample(
-    tmp_path: Path, ending: str, kind: type
-) -> None:
+def test_a_dark_frame_or_the_mean_of_several_is_taken_off_sample_by_sample(tmp_path: Path, ending, kind) -> None:
     frame = (COUNTS[0] // 4).astype(kind) + np.array(0.5 if kind is np.float32 else 0, kind)
     path = tmp_path / f"dark{ending}"
     np.save(path, frame) if ending == ".npy" else tifffile.imwrite(path, frame, photometric="minisblack")
@@ -84,3 +82,41 @@ def test_a_bench_file_names_a_level_or_a_file_beside_it_and_another_file_is_anot
         assert given_dark(str(bench.capture.dark))[0].bias.max() == level
         digests.add(bench.digest)
     assert len(digests) == 2
+
+
+OURS = """name: ours
+version: 1
+panel:
+  shape: [1080, 1920]
+  pitch: 6.4e-6
+  wavelengths: [5.17e-7]
+  distance: 0.1
+  bits: 8
+"""
+
+
+def test_a_panel_of_equal_steps_or_with_a_table_is_read(tmp_path: Path) -> None:
+    (tmp_path / "bench.yaml").write_text(OURS)
+    assert load_bench_file(tmp_path / "bench.yaml").panel.spec("ours").levels == ()
+    (tmp_path / "bench.yaml").write_text(f"{OURS}  levels: {[100 * (level / 255) ** 2 for level in range(256)]}\n")
+    ((first, *_, last),) = load_bench_file(tmp_path / "bench.yaml").panel.spec("ours").levels
+    assert (first, last) == (0.0, pytest.approx(2 * 3.14159265 * 255 / 256))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("1080, 1920", "32, 1920", ":4:10: a panel has at least 64 pixels a side"),
+        ("bits: 8", "bits: 4", ":8:9: levels are written with 8 bits, got 4"),
+        ("bits: 8", "bits: 8\n  levels: [0, 100]", ":9:11: the table has 2 entries; a panel of 8 bits has 256"),
+        ("bits: 8", "bits: 8\n  blaze: [0.7, 50.3]", ":9:10: no panel shows more than 0.5 cycles a pixel"),
+        ("bits: 8", "bits: 8\ncapture: {exposure: -1}", ":9:21: capture.exposure should be auto, or above 0"),
+        ("bits: 8", "bits: 8\ncapture: {settle: -1}", r"bench.yaml:9:19: capture.settle should be auto, or 0 to"),
+        ("bits: 8", "bits: 8\ncapture: {dark: 64}", r"bench.yaml:9:17: capture: either dark frames"),
+        ("bits: 8", "bits: 8\n  linewidth: [1e-9, 1e-9]", ":9:14: there are 2 widths; the panel has 1 wavelengths"),
+    ],
+)
+def test_another_panel_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    (tmp_path / "bench.yaml").write_text(OURS.replace(old, new))
+    with pytest.raises(UserError, match=message):
+        load_bench_file(tmp_path / "bench.yaml")

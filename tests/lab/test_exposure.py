@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.dark import Dark, given_dark
 from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.exposure import Averaged, FreshCamera, auto_exposure, averaged, combined, dark_frames
-from tests.support.simulated_devices import SimulatedCamera, Still
+from holobench_eval.lab.settle import Toggle, settle_time
+from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, pattern_phase
 
 
 def speckle(mean=1.0, shape=(60, 80)):
@@ -87,22 +89,19 @@ def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its
         assert camera.expose(1.0)[0].max() == 900
 
 
-def test_the_average_is_a_mean_that_neither_clips_nor_rounds():
+def test_the_average_neither_clips_nor_rounds_and_a_sample_is_saturated_when_any_frame_is():
     device = camera(np.full((40, 40), 1.0), bits=16, gain=3e6, noise=3.0, dark=0.0)
     taken = averaged(device, 0.02, 64, 0)  # about 60,000 counts, whose sum no 16 bits hold
     assert taken.counts.dtype == np.float64
     assert abs(taken.counts.mean() - 60_000) < 0.5
     assert 0.2 < taken.counts.std() < 0.6  # 3 / sqrt(64)
-
-
-def test_a_sample_is_saturated_when_any_averaged_frame_is():
     device = camera(np.full((50, 50), 1.0), noise=100.0, gain=4000.0)
     taken = averaged(device, 0.97, 16, 0)
     assert taken.saturated.mean() > 0.5
     assert taken.counts.max() < device.white
 
 
-def test_dark_counts_are_subtracted_at_the_photographs_own_exposure():
+def test_dark_counts_are_subtracted_at_the_photographs_own_exposure_and_bright_ones_refused():
     """Raw counts below the dark level become negative light, not 65,000."""
     still = Still(speckle(0.05))
     device = SimulatedCamera(still, bits=16, dark=40.0, dark_rate=300.0, hot=30.0, noise=1.0)
@@ -115,9 +114,6 @@ def test_dark_counts_are_subtracted_at_the_photographs_own_exposure():
         assert abs(light.mean() - 1000 * speckle().mean()) < 0.02 * 1000 + 0.2 / seconds
     nothing, _ = combined([Averaged(np.array([[30.0]]), np.array([[False]]), 1.0)], given_dark(64.0)[0])
     assert nothing[0, 0] == -34.0
-
-
-def test_dark_frames_that_are_bright_are_refused():
     with pytest.raises(DeviceError, match="is the laser really off"):
         dark_frames(camera(np.full((20, 20), 1.0)), 2, (0.01, 0.3), 0)
 
@@ -157,9 +153,39 @@ def test_a_procedure_needs_dark_frames_or_a_dark_level_and_one_exposure_for_all_
     for wrong in ({"dark_frames": 0}, {"dark_frames": 4, "dark": 64.0}, {"dark": 8}):
         with pytest.raises(UserError, match="either dark frames"):
             CaptureSettings(**wrong)
+    for wrong in ({"exposure": (0.1, 0.0)}, {"exposure": 1e9}, {"settle": -0.1}):
+        with pytest.raises(UserError, match=rf"capture\.{next(iter(wrong))} should be auto, or"):
+            CaptureSettings(**wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"exposure": (0.1, 0.0)}, {"exposure": 1e9}, {"settle": -0.1}])
-def test_times_out_of_range_are_one_line_that_names_the_key(wrong):
-    with pytest.raises(UserError, match=rf"capture\.{next(iter(wrong))} should be auto, or"):
-        CaptureSettings(**wrong)
+def toggle(scene, **camera):
+    panel, device = SimulatedSlm(scene), SimulatedCamera(scene, **{"noise": 2.0, **camera})
+    scene.channel = GREEN
+    letter = pattern_phase()[GREEN]
+    levels = {bright: Convention().levels(letter * bright) for bright in (True, False)}
+    return Toggle(
+        show=lambda bright: panel.show(levels[bright]),
+        take=lambda: averaged(device, 0.02, 1, 0).counts,
+        wait=scene.clock.wait,
+    )
+
+
+@pytest.mark.parametrize(("latency", "lag"), [(0.0, 0.0), (0.05, 0.0), (0.0, 0.02), (0.03, 0.05)])
+def test_the_measured_time_is_enough_and_no_more_than_three_times_too_long(latency, lag):
+    scene = Scene(bench(), latency=latency, lag=lag)
+    seconds = settle_time(toggle(scene))
+    needed = latency + 3.9 * lag  # exp(-3.9) is 2 %
+    assert needed <= seconds <= max(3.1 * needed, 0.0076)
+
+
+def test_a_bench_that_never_settles_or_a_panel_that_the_camera_does_not_see_is_one_line():
+    lines = {"lag": "still changes by .* after 1.5 s", "latency": "still changes 1 s after"}
+    lines |= {"restless": "still changes by .* laser's power"}
+    for fault, size in (("lag", 4.0), ("latency", 1.2), ("restless", 0.5)):
+        with pytest.raises(DeviceError, match=lines[fault]) as error:
+            settle_time(toggle(Scene(bench(), **{fault: size})))
+        assert "\n" not in str(error.value)
+    blind = toggle(Scene(bench()))
+    same = Toggle(blind.show, lambda: np.full((30, 30), 200.0), blind.wait)
+    with pytest.raises(DeviceError, match="is this the panel that the camera sees"):
+        settle_time(same)

@@ -1,3 +1,6 @@
+import os
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -5,7 +8,8 @@ import torch
 from holobench_eval.core.errors import CellError, LostDeviceError, UserError
 from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.bench_file import CaptureSettings
-from holobench_eval.lab.laser import SteadyLaser
+from holobench_eval.lab.devices import DeviceError
+from holobench_eval.lab.laser import LaserSettings, SteadyLaser, laser
 from holobench_eval.lab.photograph import Request, plane_of
 from holobench_eval.lab.rig import Rig
 from tests.support.simulated_devices import GREEN, FastSlm, Scene, SimulatedCamera, SimulatedSlm, bench, pattern_phase
@@ -103,6 +107,12 @@ def test_frames_share_a_photograph_on_a_panel_that_shows_sequences_and_no_other_
     expected = np.mean([truth(bench_rig, frame[0]) for frame in frames], axis=0) * bench_rig.camera.gain
     assert np.corrcoef(taken.light[0].numpy().ravel(), expected.ravel())[0, 1] > 0.999
     assert float(taken.light.mean()) == pytest.approx(expected.mean(), rel=0.02)
+    bench_rig.prepare(asked(), quiet)
+    for shape in ((1, 64, 64), (3, 128, 128), (128, 128)):
+        with pytest.raises(CellError, match=r"simulated panel with its wavelengths shows \(1, 128, 128\)"):
+            bench_rig.photograph(asked(torch.zeros(shape)))
+    with pytest.raises(CellError, match="no finite real numbers"):
+        bench_rig.photograph(asked(torch.full((1, 128, 128), torch.nan)))
 
 
 def test_a_bracket_measures_a_picture_that_saturates_one_exposure():
@@ -152,16 +162,6 @@ def test_exposures_are_relative_to_those_of_the_letter_divided_by_its_own():
     assert double.photograph(asked(relative=2.0)).exposure[0] == pytest.approx(one.exposures[0], rel=0.05)
 
 
-def test_a_phase_that_cannot_be_shown_is_refused_in_one_line():
-    bench_rig = rig()
-    bench_rig.prepare(asked(), quiet)
-    for shape in ((1, 64, 64), (3, 128, 128), (128, 128)):
-        with pytest.raises(CellError, match=r"simulated panel with its wavelengths shows \(1, 128, 128\)"):
-            bench_rig.photograph(asked(torch.zeros(shape)))
-    with pytest.raises(CellError, match="no finite real numbers"):
-        bench_rig.photograph(asked(torch.full((1, 128, 128), torch.nan)))
-
-
 def test_a_dropped_frame_is_taken_again_a_device_that_fails_costs_a_cell_and_one_that_is_gone_ends_the_run():
     bench_rig = rig()
     bench_rig.prepare(asked(), quiet)
@@ -179,11 +179,6 @@ def test_a_dropped_frame_is_taken_again_a_device_that_fails_costs_a_cell_and_one
     with pytest.raises(LostDeviceError, match="does not answer any more: simulated camera: no frame") as error:
         bench_rig.photograph(asked())
     assert "\n" not in str(error.value)
-
-
-def test_a_device_that_fails_while_preparing_is_one_line():
-    bench_rig = rig()
-    bench_rig.camera.failures = 1
     with pytest.raises(UserError, match="the bench is not ready: simulated camera: no frame"):
         bench_rig.prepare(asked(), quiet)
 
@@ -213,3 +208,83 @@ def test_each_laser_is_shown_the_levels_of_its_own_full_turn_with_the_map():
     for channel, levels in enumerate(convention.levels(phase)):
         bench_rig._show(phase, channel, convention, 0.0)
         assert np.array_equal(bench_rig.scene.history[-1][1], levels)
+
+
+RECORD = "import sys; open('log', 'a').write(sys.argv[1] + ' ')"
+
+
+def silent(line):
+    raise AssertionError(line)
+
+
+def test_a_command_runs_without_a_shell_for_every_channel(tmp_path):
+    command = (sys.executable, "-c", RECORD, "laser={channel}; ls $HOME")
+    source = laser(LaserSettings(command=command), 3, tmp_path, silent)
+    for channel in (0, 2, None):
+        source.select(channel)
+    source.close()
+    expected = [f"laser={word}; ls $HOME " for word in ("0", "2", "off", "off")]
+    assert (tmp_path / "log").read_text() == "".join(expected)
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [
+        ((sys.executable, "-c", "import sys; print('no key', file=sys.stderr); sys.exit(3)"), "3 .*: no key"),
+        ((sys.executable, "-c", "import time; time.sleep(60)"), "longer than 0.5 s"),
+        (("/nowhere/laser",), "does not run"),
+    ],
+)
+def test_a_command_that_fails_is_a_device_error(tmp_path, command, line):
+    source = laser(LaserSettings(command=(*command, "{channel}"), timeout=0.5), 3, tmp_path, silent)
+    with pytest.raises(DeviceError, match=line) as error:
+        source.select(0)
+    assert "\n" not in str(error.value)
+
+
+def test_a_function_of_a_file_gets_the_channel_or_none_and_what_it_raises_is_a_device_error(tmp_path):
+    text = (
+        "seen = []\ndef switch(channel):\n    seen.append(channel)\n    if channel == 2: raise ValueError('no port')\n"
+    )
+    (tmp_path / "mine.py").write_text(text)
+    source = laser(LaserSettings(callable="mine.py:switch"), 3, tmp_path, silent)
+    source.select(1)
+    with pytest.raises(DeviceError, match="ValueError: no port"):
+        source.select(2)
+    source.close()
+    assert source.function.__globals__["seen"] == [1, 2, None]
+
+
+@pytest.mark.parametrize(
+    ("settings", "channels", "line"),
+    [
+        (None, 3, "3 wavelengths need"),
+        (LaserSettings(), 3, "either 'command' or 'callable'"),
+        (LaserSettings(command=("a", "{channel}"), callable="b:c"), 3, "either"),
+        (LaserSettings(command=("laser", "on")), 3, "must hold {channel}"),
+        (LaserSettings(callable="laser"), 3, "should be path/to/file.py:function"),
+        (LaserSettings(callable="none.py:switch"), 3, "cannot be imported"),
+        (LaserSettings(callable="math:switch"), 3, "no function 'switch' in math"),
+    ],
+)
+def test_settings_that_cannot_work_are_one_line(tmp_path, settings, channels, line):
+    with pytest.raises(UserError, match=line):
+        laser(settings, channels, tmp_path, silent)
+
+
+def test_a_laser_that_nobody_can_switch_is_blocked_by_the_user_only_when_needed(tmp_path):
+    asked = []
+    source = laser(None, 1, tmp_path, asked.append)
+    for channel in (0, 0, None, None, 0, 0):
+        source.select(channel)
+    source.close()
+    assert asked == ["block the laser beam", "open the laser beam again"]
+
+
+def test_a_function_that_was_edited_is_imported_again_and_never_from_bytecode(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "mine.py"
+    for number in (1, 2):  # equal size and equal time, which is all that bytecode is checked by
+        file.write_text(f"def switch(channel):\n    return {number}\n")
+        os.utime(file, (1e9, 1e9))
+        assert laser(LaserSettings(callable="mine.py:switch"), 3, tmp_path, silent).function(0) == number

@@ -1,7 +1,5 @@
 """Files that a method takes where a machine has them are part of its phases and trainings, and of no others."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -59,9 +57,7 @@ def ids(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
     return cells, {training.method: training.id for training in planned.preparations().values()}
 
 
-def test_weights_that_arrive_make_other_phases_of_what_uses_them_alone(
-    tmp_path: Path, checkpoints: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_weights_that_arrive_make_other_phases_of_what_uses_them_alone(tmp_path, checkpoints, monkeypatch) -> None:
     cells, trainings = ids(tmp_path)
     weights = checkpoints / "alexnet-owt-7be5be79.pth"
     weights.write_bytes(b"weights")

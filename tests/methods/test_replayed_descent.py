@@ -94,7 +94,7 @@ def test_a_retrieval_through_a_learned_display_is_replayed_with_every_term_of_it
     if name == "hil":
         model: Any = NetworkApproximator(spec, Network(levels=3, width=4), None, with_critic=True, seed=0)
     else:
-        model = plugins.build("methods", name, {}, Path()).approximator(spec)
+        model = plugins.build("methods", name, {"width": 4}, Path()).approximator(spec)
     model.expose([Sample(phase, 0.5 * target, target, torch.ones(3))])
     image, found = model.image(torch.ones(3)), []
     for records in (True, False):

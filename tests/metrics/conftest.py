@@ -1,7 +1,5 @@
 """Photographs and a stand-in for the LPIPS trunk, for the metric tests."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path

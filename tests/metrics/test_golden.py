@@ -1,7 +1,5 @@
 """Every metric gives the value that its reference implementation gives on two photographs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import skimage.data

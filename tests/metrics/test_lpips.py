@@ -1,7 +1,5 @@
 """LPIPS with a random trunk equals its formula, and without a trunk there is a reason and never a number."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,9 +65,7 @@ def random_vgg(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(("network", "side"), [("alex", 96), ("vgg", 32)])
-def test_it_equals_the_formula(
-    photograph: Photograph, random_alexnet: Path, tmp_path: Path, network: Network, side: int
-) -> None:
+def test_it_equals_the_formula(photograph, random_alexnet, tmp_path, network: Network, side: int) -> None:
     path = random_alexnet if network == "alex" else random_vgg(tmp_path)
     state = torch.load(path, weights_only=True)
     pair = photograph("coffee", side), photograph("chelsea", side)
@@ -78,9 +74,7 @@ def test_it_equals_the_formula(
     assert float(lpips(*pair, network, path if network == "alex" else tmp_path)) == pytest.approx(expected, rel=1e-5)
 
 
-def test_without_weights_there_is_a_reason_and_no_number(
-    photograph: Photograph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_weights_there_is_a_reason_and_no_number(photograph, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
     reason = available("alex")
     assert "\n" not in reason
@@ -90,12 +84,17 @@ def test_without_weights_there_is_a_reason_and_no_number(
         lpips(photograph("coffee"), photograph("coffee"))
 
 
-def test_the_hub_cache_is_searched(random_alexnet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_hub_cache_is_searched_and_other_names_refused(random_alexnet: Path, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
     (tmp_path / "checkpoints").mkdir()
     (tmp_path / "checkpoints" / "alexnet-owt-7be5be79.pth").symlink_to(random_alexnet)
     assert available("alex") is None
     assert find_weights("vgg") is None
+    with pytest.raises(UserError, match="no such file"):
+        find_weights("alex", tmp_path / "absent.pth")
+    (tmp_path / "weights.pth").touch()
+    with pytest.raises(UserError, match="must be named"):
+        find_weights("alex", tmp_path / "weights.pth")
 
 
 def test_a_bad_file_is_refused_in_one_line(photograph: Photograph, random_alexnet: Path, tmp_path: Path) -> None:
@@ -110,12 +109,3 @@ def test_a_bad_file_is_refused_in_one_line(photograph: Photograph, random_alexne
             lpips(photograph("coffee", 64), photograph("chelsea", 64), "alex", path)
         assert "\n" not in str(caught.value)
         assert str(path) in str(caught.value)
-
-
-def test_a_place_that_does_not_exist_or_has_another_name_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no such file"):
-        find_weights("alex", tmp_path / "absent.pth")
-    other = tmp_path / "weights.pth"
-    other.touch()
-    with pytest.raises(UserError, match="must be named"):
-        find_weights("alex", other)

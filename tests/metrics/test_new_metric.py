@@ -1,7 +1,5 @@
 """A metric costs a file and a name: here the file lies beside the package's, and its name is added to the list."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Three published captures of one real display keep their order and their scores."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2
@@ -58,15 +56,13 @@ def scores() -> dict[str, tuple[dict[str, float], dict[str, float]]]:
     return measured
 
 
-def test_the_published_values_are_met(scores: dict[str, tuple[dict[str, float], dict[str, float]]]) -> None:
+def test_the_published_values_are_met(scores) -> None:
     found = {name: pair[0]["psnr_linear"] for name, pair in scores.items()}
     assert found == pytest.approx(PUBLISHED, abs=0.3)
     assert sorted(found, key=found.__getitem__) == list(PUBLISHED)
 
 
-def test_the_rigid_refinement_alone_keeps_the_order(
-    scores: dict[str, tuple[dict[str, float], dict[str, float]]],
-) -> None:
+def test_the_rigid_refinement_alone_keeps_the_order(scores) -> None:
     plain = {name: pair[1]["psnr_linear"] for name, pair in scores.items()}
     refined = {name: pair[1]["psnr_linear_refined"] for name, pair in scores.items()}
     assert sorted(refined, key=refined.__getitem__) == list(PUBLISHED)

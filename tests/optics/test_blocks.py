@@ -31,8 +31,15 @@ def filled():
     return found
 
 
-def test_every_line_is_worked_on_once():
+def test_every_line_is_worked_on_once_and_a_failure_passes_through():
     assert torch.equal(filled(), torch.arange(100.0))
+
+    def fail(lines):
+        raise ArithmeticError
+
+    with pytest.raises(ArithmeticError):
+        in_blocks(fail, torch.zeros(100), 100, 10_000)
+    assert torch.get_num_threads() == 2
 
 
 def test_threads_give_the_numbers_of_one_thread():
@@ -56,15 +63,6 @@ def test_inference_mode_reaches_the_threads():
     with torch.inference_mode():
         image = model.forward(field)
     assert torch.equal(image.clone(), model.forward(field))
-
-
-def test_a_failure_passes_through_and_leaves_the_number_of_threads():
-    def fail(lines):
-        raise ArithmeticError
-
-    with pytest.raises(ArithmeticError):
-        in_blocks(fail, torch.zeros(100), 100, 10_000)
-    assert torch.get_num_threads() == 2
 
 
 def _work_in_the_child(answer):

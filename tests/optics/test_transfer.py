@@ -58,8 +58,15 @@ def test_columns_of_zeros_are_left_out_and_change_nothing():
     assert torch.allclose(function.values, values, rtol=1e-6)
 
 
-def test_a_transfer_function_of_zeros_passes_nothing():
+def test_zeros_pass_nothing_an_empty_batch_stays_empty_and_torchs_default_type_changes_nothing():
     assert not transfer_function(torch.zeros(40, 40, dtype=torch.complex64)).convolve(white(20, 20)).any()
+    assert transfer_function(white(60, 60)).convolve(white(0, 30, 30)).shape == (0, 30, 30)
+    expected = transfer_function(white(60, 60, seed=1)).convolve(white(30, 30))
+    torch.set_default_dtype(torch.float64)
+    try:
+        assert torch.equal(transfer_function(white(60, 60, seed=1)).convolve(white(30, 30)), expected)
+    finally:
+        torch.set_default_dtype(torch.float32)
 
 
 @pytest.mark.parametrize(
@@ -87,19 +94,6 @@ def test_a_model_can_be_copied_and_sent_to_another_process():
     model, field = AngularSpectrum((40, 40), 6.4e-6, 517e-9, 0.01), white(40, 40)
     for other in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
         assert torch.equal(other.forward(field), model.forward(field))
-
-
-def test_another_default_type_of_torch_changes_nothing():
-    expected = transfer_function(white(60, 60, seed=1)).convolve(white(30, 30))
-    torch.set_default_dtype(torch.float64)
-    try:
-        assert torch.equal(transfer_function(white(60, 60, seed=1)).convolve(white(30, 30)), expected)
-    finally:
-        torch.set_default_dtype(torch.float32)
-
-
-def test_an_empty_batch_stays_empty():
-    assert transfer_function(white(60, 60)).convolve(white(0, 30, 30)).shape == (0, 30, 30)
 
 
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):

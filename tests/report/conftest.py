@@ -1,7 +1,5 @@
 """A browser for the pages of reports and sites; playwright has one a process."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from typing import Any

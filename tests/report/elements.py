@@ -1,7 +1,5 @@
 """The elements of a page as a browser finds them."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 
 Attributes = dict[str, str | None]

@@ -1,7 +1,5 @@
 """A section costs a file and a line: here the file lies beside the package's, and its name is added to the list."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is told of a twin is what was put between it and its display."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Changes of a bench at test time: each changes the stages that it names, by as much as it says, and no other."""
+"""Changes of a bench at test time and random draws of it: of the stages that they name, and of no other."""
 
 import itertools
 from dataclasses import fields, replace
@@ -11,8 +11,10 @@ from holobench_eval.core.plugins import build
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import KINDS, altered, checked
 from holobench_eval.display.simulated.changes.camera import SENSORS
+from holobench_eval.display.simulated.changes.draws import PARAMETERS, STAGES, drawn, values
 from holobench_eval.display.simulated.changes.kind import Kind
 from holobench_eval.display.simulated.changes.vision import EYEPIECE, Prescription
+from holobench_eval.display.simulated.profile import names
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import score
 from holobench_eval.optics.phase import blaze
@@ -72,7 +74,7 @@ def test_the_nominal_value_changes_nothing(kind):
     assert altered(profile, kind, KINDS[kind].nominal) is profile
     applied = KINDS[kind].apply(profile, KINDS[kind].nominal)
     assert changed_fields(profile, applied) <= {"propagation", "panel"}
-    assert open_bench(applied, PANEL).bench.spec == open_bench(profile, PANEL).bench.spec
+    assert applied.spec(PANEL) == profile.spec(PANEL)
 
 
 WRONG = {"drift": (-1, "a year", True), "camera_shift_x": (41,), "bits": (0, 2.5), "temprature": (1,)}
@@ -94,9 +96,14 @@ def test_a_value_has_one_form_however_it_is_written():
     for wrong in (0, "01", 1.5, "1_0", -1):
         with pytest.raises(UserError):
             checked("sibling", wrong)
+    for place in ("left", "1.5", "nan"):
+        with pytest.raises(UserError, match=f"eye_pupil '{place}': expected places from '-1' to '1' radii of the iris"):
+            checked("eye_pupil", place)
 
 
-def test_a_change_adds_to_what_the_profile_has():
+def test_a_change_adds_to_what_the_profile_has_and_sensors_have_their_published_pitch():
+    assert SENSORS["canon-t6i"].pitch == 3.72e-6
+    assert SENSORS["fujifilm-s5-pro"].pitch == pytest.approx(23e-3 / 4256, rel=2e-3)
     profile = load_profile("leto-aged")
     aged = replace(profile, drift=replace(profile.drift, days=30.0))
     assert altered(aged, "drift", 10.0).drift.days == 40
@@ -226,18 +233,7 @@ def test_a_lens_moves_the_image_without_loss_where_the_camera_follows():
         moved = open_bench(altered(profile, "refocus", millimetres), PANEL)
         assert abs(psnr(nominal, moved) - before) < 1
     assert psnr(nominal, left) < before - 3
-
-
-def test_the_cameras_of_the_paper_have_their_published_pitch():
-    assert SENSORS["canon-t6i"].pitch == 3.72e-6
-    assert SENSORS["fujifilm-s5-pro"].pitch == pytest.approx(23e-3 / 4256, rel=2e-3)
-
-
-def test_an_unmoved_camera_keeps_its_registration():
-    profile = load_profile("ideal")
-    nominal = open_bench(profile, PANEL)
-    blurred = open_bench(altered(profile, "defocus", 0.5), PANEL, 0, nominal)
-    assert blurred.registration is nominal.registration
+    assert left.registration is nominal.registration  # of a camera that is not moved
 
 
 def test_an_eye_sees_the_light_that_is_tilted_into_its_pupil():
@@ -248,7 +244,88 @@ def test_an_eye_sees_the_light_that_is_tilted_into_its_pupil():
     assert seen == pytest.approx([0.25, 1, 1, 1, 0], abs=0.03)  # at the soft edge half of the amplitude
 
 
-@pytest.mark.parametrize("place", ["left", "1.5", "nan"])
-def test_a_pupil_outside_the_iris_is_refused(place):
-    with pytest.raises(UserError, match=f"eye_pupil '{place}': expected places from '-1' to '1' radii of the iris"):
-        checked("eye_pupil", place)
+DRAWS = range(1, 201)
+READ = {
+    "gamma": lambda p: p.lut.gamma[1],
+    "gain": lambda p: p.lut.gain[1],
+    "crosstalk": lambda p: p.crosstalk.width,
+    "fill": lambda p: p.aperture.fill,
+    "flicker": lambda p: p.flicker.rms,
+    "beam": lambda p: p.illumination.beam_sigma,
+    "fringes": lambda p: p.illumination.fringes,
+    "wavefront": lambda p: p.illumination.phase_rms,
+    "distance": lambda p: 100 * p.propagation.distance_error,
+    "astigmatism": lambda p: p.propagation.aberration["astigmatism_0"] / (0.45 / 0.8) ** 2,
+    "coma": lambda p: p.propagation.aberration["coma_x"] / (0.45 / 0.8) ** 3,
+    "zero_order": lambda p: p.zero_order.fraction,
+    "zero_phase": lambda p: p.zero_order.phase,
+    "specks": lambda p: p.coherent_noise.specks,
+    "linewidth": lambda p: 1e9 * p.spectrum.width[1],
+    "stray": lambda p: p.stray_light.share,
+    "reach": lambda p: p.stray_light.reach,
+}
+"""Where a drawn value has to arrive on the bench."""
+
+
+@pytest.fixture(scope="module")
+def profile():
+    return load_profile("leto-2020")
+
+
+def test_values_stay_in_their_ranges_and_reach_near_both_ends(profile):
+    every = [values(profile, index) for index in DRAWS]
+    assert len({drawn(profile, index).seed for index in DRAWS} | {profile.seed}) == len(DRAWS) + 1
+    for name, one in PARAMETERS.items():
+        column = [found[name] for found in every]
+        near = 0.05 * (one.high - one.low)
+        assert one.low <= min(column) < one.low + near, name
+        assert one.high - near < max(column) <= one.high, name
+
+
+def test_a_draw_depends_on_the_name_and_seed_of_the_profile_and_on_its_number_alone(profile):
+    assert values(profile, 3) == values(profile, 3) == values(profile.scaled(PANEL), 3)
+    assert values(replace(profile, lut=load_profile("ideal").lut, version=9), 3) == values(profile, 3)
+    for other in (values(profile, 4), values(replace(profile, seed=2), 3), values(replace(profile, name="x"), 3)):
+        assert all(other[name] != value for name, value in values(profile, 3).items())
+
+
+def test_no_two_parameters_are_drawn_together(profile):
+    every = torch.tensor([list(values(profile, index).values()) for index in DRAWS], dtype=torch.float64)
+    correlation = torch.corrcoef(every.T) - torch.eye(len(PARAMETERS), dtype=torch.float64)
+    assert correlation.abs().max() < 0.3
+
+
+def test_every_value_arrives_on_the_bench(profile):
+    found, made = values(profile, 5), drawn(profile, 5)
+    assert set(READ) == set(PARAMETERS)
+    for name, read in READ.items():
+        assert read(made) == pytest.approx(round(found[name]) if name == "specks" else found[name]), name
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_draw_changes_the_stages_that_it_names_and_no_other(name):
+    profile = load_profile(name)
+    made = drawn(profile, 1)
+    changed = {item.name for item in fields(profile) if getattr(made, item.name) != getattr(profile, item.name)}
+    assert changed <= set(STAGES)
+    assert {"seed", "lut", "crosstalk", "illumination", "propagation", "zero_order"} <= changed
+    assert made.spec() == profile.spec()
+
+
+def test_a_source_that_is_no_laser_keeps_its_spectrum_and_without_an_iris_aberrations_are_of_the_whole_band(profile):
+    broad = load_profile("leto-sled")
+    assert drawn(broad, 5).spectrum == broad.spectrum
+    none, whole = (drawn(replace(profile, panel=replace(profile.panel, pupil=pupil)), 5) for pupil in (None, 1.0))
+    assert none.propagation == whole.propagation
+
+
+def test_a_drawn_bench_is_built_and_photographs():
+    profile = load_profile("leto-aged")
+    phase = 6 * torch.rand(3, *PANEL, generator=torch.Generator().manual_seed(1))
+    target = torch.full((3, 104, 104), 0.5)
+    images = []
+    for index in (2, 3):
+        shot = open_bench(drawn(profile, index), PANEL, seed=2020).photograph(phase, target, "flat", 0)
+        assert shot.residual < profile.residual_bound
+        images.append(shot.image)
+    assert not torch.allclose(*images, atol=0.05)

@@ -1,7 +1,5 @@
 """The quantities of a bench are those of its profile, and do not depend on what images leave open."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import replace
@@ -9,20 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from holobench_eval.display import load_profile
-from holobench_eval.display.estimates import (
-    MODES,
-    QUANTITIES,
-    Estimate,
-    disc,
-    estimate,
-    focusing,
-    joined,
-    reach,
-    stroke,
-    undiffracted,
-    zernike_waves,
-)
+from holobench_eval.display import estimates, load_profile
 from holobench_eval.display.simulated.ground_truth import truth
 from holobench_eval.display.simulated.pipeline import SimulatedBench
 from holobench_eval.display.simulated.profile import Profile, names
@@ -43,10 +28,10 @@ def test_every_display_tells_every_quantity_of_every_colour_once_and_in_its_unit
     found, colours = truth(bench), range(len(bench.channels))
     keys = [(one.name, one.colour) for one in found]
     assert len(keys) == len(set(keys))
-    without = ("undiffracted_phase", "stray_reach", *(MODES if bench.spec.plane == "fourier" else ()))
+    without = ("undiffracted_phase", "stray_reach", *(estimates.MODES if bench.spec.plane == "fourier" else ()))
     absent = {(quantity, colour) for quantity in without for colour in colours}
-    assert set(keys) | absent == {(quantity, colour) for quantity in QUANTITIES for colour in colours}
-    assert all(one.unit == QUANTITIES[one.name].unit and math.isfinite(one.value) for one in found)
+    assert set(keys) | absent == {(quantity, colour) for quantity in estimates.QUANTITIES for colour in colours}
+    assert all(one.unit == estimates.QUANTITIES[one.name].unit and math.isfinite(one.value) for one in found)
 
 
 def test_an_ideal_display_has_a_straight_table_all_light_and_no_aberration() -> None:
@@ -105,12 +90,13 @@ def test_a_curved_beam_defocuses_by_the_square_of_the_distance_over_its_radius()
     wavelength, distance, pitch, radius = 517e-9, 0.02, 6.4e-6, 3.0
     rows = (torch.arange(200) - 99.5) * pitch
     beam = -math.pi * (rows[:, None] ** 2 + rows[None, :] ** 2) / (wavelength * radius)
-    y, x = disc()
+    y, x = estimates.disc()
     edge = 0.8 / (2 * pitch)
     longer = -math.pi * wavelength * (distance**2 / radius) * edge**2 * (y**2 + x**2)
-    found = focusing(beam, reach(wavelength, distance, pitch, 0.8))
+    far = estimates.reach(wavelength, distance, pitch, 0.8)
+    found = estimates.focusing(beam, far)
     assert torch.allclose(found, longer, rtol=1e-6, atol=1e-9)
-    tilted = focusing(beam + 3 * rows[:, None] / rows.max() + 1, reach(wavelength, distance, pitch, 0.8))
+    tilted = estimates.focusing(beam + 3 * rows[:, None] / rows.max() + 1, far)
     assert torch.allclose(tilted, longer, rtol=1e-6, atol=1e-9)
 
 
@@ -121,9 +107,9 @@ def test_the_beam_of_a_display_is_part_of_its_focus() -> None:
 
 
 def test_coefficients_come_back_from_their_polynomials() -> None:
-    y, x = disc()
+    y, x = estimates.disc()
     phase = TAU * (0.1 * zernike(NAMES["defocus"], y, x) - 0.03 * zernike(NAMES["coma_y"], y, x)) + 0.7
-    found = zernike_waves(phase)
+    found = estimates.zernike_waves(phase)
     assert found["defocus"] == pytest.approx(0.1)
     assert found["coma_y"] == pytest.approx(-0.03)
     assert found["spherical"] == pytest.approx(0, abs=1e-9)
@@ -131,7 +117,7 @@ def test_coefficients_come_back_from_their_polynomials() -> None:
 
 def test_a_stroke_is_found_whatever_constant_is_added() -> None:
     levels = torch.linspace(0.05, 0.95, 20, dtype=torch.float64)
-    law = stroke(levels, TAU * (0.9 * levels**1.3 + 0.4))
+    law = estimates.stroke(levels, TAU * (0.9 * levels**1.3 + 0.4))
     assert (law.exponent, law.gain, law.offset) == pytest.approx((1.3, 0.9, 0.4), abs=1e-5)
 
 
@@ -145,12 +131,13 @@ def test_an_iris_beside_the_zero_order_leaves_none_of_it_and_next_to_none_has_no
     found = told(load_profile("pluto-offaxis"))
     assert found["undiffracted_fraction", 1] == 0
     assert ("undiffracted_phase", 1) not in found
-    assert [one.name for one in undiffracted(0.01 + 0j, 0)] == ["undiffracted_fraction"]
+    assert [one.name for one in estimates.undiffracted(0.01 + 0j, 0)] == ["undiffracted_fraction"]
 
 
 def test_estimates_stand_beside_the_truth_of_their_name_and_colour() -> None:
-    found = [estimate("crosstalk", 0, 0.5), Estimate("hue", None, math.nan, "deg")]
-    first, other = joined(found, [estimate("crosstalk", 1, 0.1), estimate("crosstalk", 0, 0.45)])
-    known = {"name": "crosstalk", "colour": 0, "unit": "px", "error": QUANTITIES["crosstalk"].error}
+    found = [estimates.estimate("crosstalk", 0, 0.5), estimates.Estimate("hue", None, math.nan, "deg")]
+    truths = [estimates.estimate("crosstalk", colour, value) for colour, value in ((1, 0.1), (0, 0.45))]
+    first, other = estimates.joined(found, truths)
+    known = {"name": "crosstalk", "colour": 0, "unit": "px", "error": estimates.QUANTITIES["crosstalk"].error}
     assert first == known | {"value": 0.5, "truth": 0.45}
     assert (other["value"], other["truth"], other["error"]) == (None, None, None)

@@ -1,7 +1,5 @@
 """Measured maps act as the seeded ones that they are equal to, and a file that is not as it should be is refused."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -88,12 +86,9 @@ def aberration(profile: Profile) -> Profile:
 def zero_order(profile: Profile) -> Profile:
     modulated, unmodulated = profile.zero_order.amplitudes(0)
     relative = unmodulated / modulated
-    power = {"power": torch.full((3,), modulated**2)}
-    return replace(
-        profile,
-        zero_order=type(profile.zero_order)(maps={"field": torch.tensor([[relative.real, relative.imag]] * 3)}),
-        illumination=replace(profile.illumination, maps=power),
-    )
+    still = type(profile.zero_order)(maps={"field": torch.tensor([[relative.real, relative.imag]] * 3)})
+    light = replace(profile.illumination, maps={"power": torch.full((3,), modulated**2)})
+    return replace(profile, zero_order=still, illumination=light)
 
 
 def stray_light(profile: Profile) -> Profile:
@@ -103,9 +98,7 @@ def stray_light(profile: Profile) -> Profile:
 
 
 @pytest.mark.parametrize("measured", [table, gain, crosstalk, illumination, zero_order, stray_light])
-def test_a_map_that_is_equal_to_what_is_drawn_gives_the_same_picture(
-    seeded: Profile, measured: Callable[[Profile], Profile]
-) -> None:
+def test_a_map_that_is_equal_to_what_is_drawn_gives_the_same_picture(seeded: Profile, measured) -> None:
     before, after = picture(seeded), picture(measured(seeded))
     assert float((after - before).norm() / before.norm()) < 2e-4
 
@@ -213,9 +206,7 @@ def test_a_profile_reads_its_maps_and_says_what_they_hold(tmp_path: Path) -> Non
 def test_a_profile_with_maps_has_one_panel(tmp_path: Path) -> None:
     profile = load_profile(str(written(tmp_path, packed(arrays()))))
     assert profile.scaled(PANEL) is profile is profile.scaled((500, 500))
-    with pytest.raises(
-        UserError, match=r"^'lab' has maps of its panel of 64 x 80 pixels; give that panel, not \[64, 70\]$"
-    ):
+    with pytest.raises(UserError, match=r"^'lab' has maps of its panel of 64 x 80 pixels; .* not \[64, 70\]$"):
         profile.scaled((64, 70))
 
 
@@ -228,9 +219,8 @@ def test_changes_act_on_top_of_maps_or_are_refused(tmp_path: Path) -> None:
         altered(profile, "bits", 4.0)
     geometry = SimulatedBench(profile).channels[0].geometry
     warm = altered(profile, "temperature", 20.0)
-    assert float(warm.lut.gain_map(geometry).mean() / profile.lut.gain_map(geometry).mean()) == pytest.approx(
-        warm.lut.gain[0]
-    )
+    gains = [float(one.lut.gain_map(geometry).mean()) for one in (profile, warm)]
+    assert gains[1] / gains[0] == pytest.approx(warm.lut.gain[0])
     assert altered(profile, "ambient", 0.2).sensor.surrounding(1) == pytest.approx(0.7)
     assert altered(profile, "laser_power", 0.5).illumination.laser(0) == pytest.approx(0.25)
     assert set(altered(profile, "sensor", "fujifilm-s5-pro").sensor.maps) == {"shading", "ambient"}
@@ -299,9 +289,7 @@ def test_a_file_that_is_no_file_of_maps_is_one_line(tmp_path: Path, content: byt
         ({}, "zero_order: {fraction: 0.1}\n", "zero_order.fraction has no effect beside the map zero_order.field$"),
     ],
 )
-def test_a_file_that_is_elsewhere_or_another_one_is_one_line(
-    tmp_path: Path, said: Arrays, more: str, message: str
-) -> None:
+def test_a_file_that_is_elsewhere_or_another_one_is_one_line(tmp_path, said, more: str, message: str) -> None:
     folder = tmp_path / "profile"
     folder.mkdir()
     (tmp_path / "lab.npz").write_bytes(packed(arrays()))

@@ -1,7 +1,5 @@
 """A new stage costs one file and one field of Profile, wherever it acts on the light."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys
@@ -82,9 +80,8 @@ def test_a_stage_is_one_file_and_one_field(tmp_path: Path) -> None:
     ideal = (folder / "profiles" / "ideal.yaml").read_text()
     (tmp_path / "mine.yaml").write_text(f"{ideal}\nneutral_density: {{density: 2}}\n")
     command = [sys.executable, "-c", USE, "mine.yaml"]
-    done = subprocess.run(
-        command, cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
-    )
+    given = {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, cwd=tmp_path, env=given, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
@@ -99,9 +96,7 @@ def intensity(ideal: Profile, phase: Tensor) -> Callable[..., Tensor]:
     return lambda **hooks: SimulatedBench(replace(ideal, dust_plane=acting(**hooks))).integrated(phase[1], 1)
 
 
-def test_a_stage_may_change_the_hologram_and_the_light_at_the_panel_on_the_way_and_in_the_image(
-    intensity: Callable[..., Tensor], ideal: Profile, phase: Tensor
-) -> None:
+def test_a_stage_may_change_the_hologram_and_the_light_anywhere(intensity, ideal: Profile, phase: Tensor) -> None:
     turned, plain = intensity(hologram=lambda _, geometry: phase[0]), intensity()
     assert torch.allclose(turned, SimulatedBench(ideal).integrated(phase[0] + phase[1], 1), atol=1e-5)
     assert torch.allclose(intensity(panel=lambda _, geometry: torch.tensor(0.5)), plain / 4, rtol=1e-4)

@@ -1,13 +1,21 @@
+"""Profiles are read with their effects, and a fault in one is a line with its place."""
+
 import math
+from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from holobench_eval.commands.show import effects as listed
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import names
+from holobench_eval.display.simulated.stages import Flicker, LookUpTable
+from holobench_eval.display.simulated.trust import Trust
+from holobench_eval.methods.calibrated.display_model import FORM
 from holobench_eval.optics.padding import spread
 
 PROFILES = files("holobench_eval.display.simulated") / "profiles"
@@ -141,3 +149,70 @@ def test_a_base_is_looked_for_beside_the_file_that_names_it_and_nowhere_else(tmp
         load_profile("mine.yaml", tmp_path)
     with pytest.raises(UserError, match="no such file"):
         load_profile("../mine.yaml")
+
+
+def found(name: str) -> set[str]:
+    return {one.name for one in load_profile(name).effects()}
+
+
+def test_an_effect_is_listed_when_it_is_switched_on() -> None:
+    ideal = load_profile("ideal")
+    assert found("ideal") == {"quantisation"}
+    flickering = {one.name: one.text for one in replace(ideal, flicker=Flicker(0.02)).effects()}
+    assert flickering.keys() - {"quantisation"} == {"flicker"}
+    assert "2 %" in flickering["flicker"]
+    bent = replace(ideal, lut=LookUpTable(gamma=(1.0, 1.2, 1.0)))
+    assert "1/1.2/1" in next(one.text for one in bent.effects() if one.name == "look_up_table")
+
+
+def test_uneven_effects_are_outside_the_form_of_the_model() -> None:
+    aged = load_profile("leto-aged")
+    uneven = replace(
+        aged,
+        lut=replace(aged.lut, bend=0.03),
+        crosstalk=replace(aged.crosstalk, ratio=1.4),
+        flicker=replace(aged.flicker, ripple=0.02),
+    )
+    more = {one.name for one in uneven.effects()} - found("leto-aged")
+    assert more == {"uneven_table", "uneven_crosstalk", "ripple"}
+    assert more.isdisjoint(FORM)
+
+
+def test_no_effect_is_listed_twice_and_a_form_names_only_those_that_some_display_has_or_may_have() -> None:
+    told = [[one.name for one in load_profile(name).effects()] for name in names()]
+    assert all(len(effects) == len(set(effects)) for effects in told)
+    everywhere = set().union(*told)
+    assert FORM - everywhere <= {"drift", "astigmatism_45", "coma_y", "spherical", "offset"}
+
+
+def test_the_form_of_the_model_is_wrong_for_leto_aged_and_more_so_for_the_dusty_one() -> None:
+    for name in ("leto-aged", "leto-dusty"):
+        lacking = {effect for effect, _, modelled in listed(name) if not modelled}
+        assert {"sub_pixel_field", "pixel_aperture", "flicker", "plane_dust", "roughness", "noise"} <= lacking
+        assert {"look_up_table", "crosstalk", "zero_order", "defocus", "coma_x"}.isdisjoint(lacking)
+    assert "trefoil_y" in {effect for effect, _, modelled in listed("leto-dusty") if not modelled}
+    lacking = {effect for effect, _, modelled in listed("leto-2020") if not modelled}
+    assert "spectrum" in lacking
+    assert {"blaze", "stray_light"}.isdisjoint(lacking)
+
+
+TRUST = (
+    "twin: {of: leto-aged, photographs: 59, pictures: 8, gap: {wirtinger: 1.0}, light: [0.05], "
+    "flattery: 3.2, flattery_error: 0.4}"
+)
+
+
+def test_a_display_that_is_like_a_twin_is_none(tmp_path: Path) -> None:
+    (tmp_path / "lab.yaml").write_text(f"like: ideal\nname: lab\n{TRUST}\n")
+    (tmp_path / "changed.yaml").write_text("like: lab.yaml\nname: changed\nflicker: {rms: 0.1}\n")
+    assert "more than 3 dB" in load_profile("lab.yaml", tmp_path).twin.words
+    assert load_profile("changed.yaml", tmp_path).twin == Trust()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("0.4", "-0.4"), ("59", "-1"), ("3.2", "many"), ("1.0", "1000"), ("0.05", "-1")]
+)
+def test_impossible_figures_are_refused_at_their_place(tmp_path: Path, old: str, new: str) -> None:
+    (tmp_path / "lab.yaml").write_text(f"like: ideal\nname: lab\n{TRUST.replace(old, new)}\n")
+    with pytest.raises(UserError, match=r"lab\.yaml:3:\d+: "):
+        load_profile("lab.yaml", tmp_path)

@@ -4,15 +4,19 @@ import importlib.metadata
 import re
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import installing
+from holobench_eval.lab.devices import DeviceError
 from holobench_eval.lab.drivers import catalogue as drivers
 from holobench_eval.lab.drivers.catalogue import DRIVERS, checked_params, open_device, survey
+from holobench_eval.lab.drivers.worker import Worker
+from tests.support.patience import PATIENCE
 
 MONITOR = {"name": "HDMI-1", "resolution": [1920, 1080]}
 OPENCV = {"device": 0, "resolution": [64, 48]}
@@ -40,9 +44,7 @@ def test_importing_the_drivers_imports_none_of_their_packages() -> None:
         ("camera", "micromanager", {"config": ""}, "parameter 'config'"),
     ],
 )
-def test_a_wrong_bench_file_is_one_line_before_any_device_moves(
-    kind: Any, driver: str, params: dict[str, Any], message: str
-) -> None:
+def test_a_wrong_bench_file_is_one_line_before_any_device_moves(kind, driver, params, message) -> None:
     for check in (lambda: checked_params(kind, driver, params), lambda: open_device(kind, driver, params)):
         with pytest.raises(UserError, match=message) as caught:
             check()
@@ -59,9 +61,7 @@ def test_a_wrong_bench_file_is_one_line_before_any_device_moves(
         ("camera", "micromanager", {"config": __file__}, "pymmcore_plus", "micromanager"),
     ],
 )
-def test_a_missing_package_is_told_with_the_command_that_installs_it(
-    monkeypatch: pytest.MonkeyPatch, kind: Any, driver: str, params: dict[str, Any], package: str, extra: str
-) -> None:
+def test_a_missing_package_is_told_with_its_command(monkeypatch, kind, driver, params, package, extra) -> None:
     _hide(monkeypatch, package)
     if package == "rawpy":
         pytest.importorskip("gphoto2")
@@ -98,3 +98,44 @@ def test_looking_for_devices_survives_broken_packages(monkeypatch: pytest.Monkey
         for name, driver in list(table.items()):
             monkeypatch.setitem(table, name, replace(driver, answering=broken))
     assert {entry.why for entry in survey()} == {"OSError: libusb is missing"}
+
+
+def test_every_call_and_the_idling_between_are_on_one_thread_that_is_not_the_callers() -> None:
+    idled: list[int] = []
+    worker = Worker("panel", idle=lambda: idled.append(threading.get_ident()))
+    threads = {worker.call("a call", PATIENCE, threading.get_ident) for _ in range(3)}
+    deadline = time.monotonic() + PATIENCE
+    while not idled and time.monotonic() < deadline:
+        time.sleep(0.01)
+    worker.stop(1, lambda: None)
+    assert threads == set(idled)
+    assert threads != {threading.get_ident()}
+
+
+def test_a_call_that_never_returns_is_left_behind_and_the_device_is_not_asked_again() -> None:
+    worker, forever = Worker("camera"), threading.Event()
+    began = time.monotonic()
+    with pytest.raises(DeviceError, match=r"camera: taking a picture took longer than 0\.2 s"):
+        worker.call("taking a picture", 0.2, forever.wait)
+    with pytest.raises(DeviceError, match="took longer"):
+        worker.call("taking a picture", PATIENCE, lambda: None)
+    worker.stop(PATIENCE, forever.wait)
+    assert time.monotonic() - began < PATIENCE / 2
+    forever.set()
+
+
+def test_what_a_library_raises_becomes_one_line_and_users_errors_stay() -> None:
+    def broken(error: Exception) -> None:
+        raise error
+
+    worker = Worker("camera")
+    with pytest.raises(DeviceError, match=r"^camera: reading failed: OSError: a b$"):
+        worker.call("reading", 5, lambda: broken(OSError("a\n  b")))
+    with pytest.raises(DeviceError, match="reading failed: TimeoutError"):
+        worker.call("reading", 5, lambda: broken(TimeoutError("its own")))
+    with pytest.raises(UserError, match=r"^no such camera$"):
+        worker.call("reading", 5, lambda: broken(UserError("no such camera")))
+    assert worker.call("reading", 5, lambda: 7) == 7
+    worker.stop(5, lambda: broken(OSError()))
+    with pytest.raises(DeviceError, match="camera is closed"):
+        worker.call("reading", 5, lambda: 7)

@@ -35,9 +35,7 @@ def camera(params: dict[str, Any]) -> Iterator[Camera]:
     camera.close()
 
 
-def test_fresh_counts_are_low_justified_with_the_white_of_the_bit_depth_and_the_exposure_is_told(
-    camera: Camera,
-) -> None:
+def test_fresh_counts_are_low_justified_with_the_white_of_their_bits_and_their_exposure(camera: Camera) -> None:
     assert camera.name == "Micro-Manager DCam Lab camera"
     assert (camera.white, camera.exposures) == (4095, (1e-6, 10.0))
     taken = [camera.expose(seconds) for seconds in (0.01, 0.05, 0.02)]

@@ -50,9 +50,7 @@ def test_every_level_of_every_pixel_is_at_once_what_another_program_sees(slm: Mo
         assert np.array_equal(eyes.panel(), np.repeat(picture[..., None], 3, axis=2))
 
 
-def test_the_pointer_may_leave_the_panel_and_is_invisible_on_it_while_the_picture_stays(
-    slm: MonitorSlm, eyes: Eyes
-) -> None:
+def test_the_pointer_is_invisible_on_the_panel_and_a_notice_or_a_bent_gamma_curve_is_told(slm, eyes) -> None:
     levels = every_level()
     slm.show(levels)
     eyes.move_pointer(500, 300)
@@ -60,10 +58,6 @@ def test_the_pointer_may_leave_the_panel_and_is_invisible_on_it_while_the_pictur
     eyes.move_pointer(PANEL_AT[0] + 300, 300)
     assert not eyes.pointer_is_visible()
     assert np.array_equal(eyes.panel()[..., 0], levels)
-
-
-def test_a_notice_in_front_of_the_panel_and_a_bent_gamma_curve_are_told(slm: MonitorSlm, eyes: Eyes) -> None:
-    levels = every_level()
     with (
         eyes.notice(),
         pytest.raises(DeviceError, match=r"screen does not show the picture: \d+ of 2073600.* row 900, "),
@@ -89,13 +83,10 @@ def test_another_name_or_resolution_is_refused_with_what_was_found(desktop: str,
         MonitorSlm(MonitorSettings(**{**PANEL, **asked}))
 
 
-def test_two_monitors_of_the_same_name_are_refused() -> None:
+def test_two_monitors_of_one_name_or_no_desktop_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     twin = SimpleNamespace(get_monitor_name=lambda: "HOLOEYE", width=1920, height=1080)
     with pytest.raises(UserError, match="2 monitors 'holoeye 1920x1080'; found: HOLOEYE 1920x1080, HOLOEYE"):
         matching([twin, twin], MonitorSettings("holoeye", (1920, 1080)))
-
-
-def test_without_a_desktop_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyglet")
     monkeypatch.setenv("DISPLAY", ":4242")
     with pytest.raises(UserError, match="no desktop"):

@@ -48,12 +48,16 @@ class StandIn:
         self.released = True
 
 
-def test_whatever_a_camera_does_of_itself_is_switched_off() -> None:
+def test_whatever_a_camera_does_of_itself_is_switched_off_or_lacking() -> None:
     capture = StandIn()
     OpencvCamera(SETTINGS, capture).close()
     off = {cv2.CAP_PROP_AUTO_EXPOSURE: 1, cv2.CAP_PROP_AUTO_WB: 0, cv2.CAP_PROP_GAIN: 0, cv2.CAP_PROP_GAMMA: 100}
     assert {control: capture.controls[control] for control in off} == off
     assert capture.released
+    lacking = cv2.CAP_PROP_AUTO_WB, cv2.CAP_PROP_GAIN, cv2.CAP_PROP_GAMMA, cv2.CAP_PROP_SHARPNESS
+    OpencvCamera(SETTINGS, StandIn(absent=lacking)).close()
+    with pytest.raises(UserError, match="auto exposure cannot be set"):
+        OpencvCamera(SETTINGS, StandIn(absent=(cv2.CAP_PROP_AUTO_EXPOSURE,)))
 
 
 @pytest.mark.parametrize(
@@ -71,20 +75,10 @@ def test_a_control_that_stays_on_is_refused(control: int, what: str) -> None:
     assert capture.released
 
 
-def test_a_camera_may_lack_every_control_but_that_of_the_exposure() -> None:
-    lacking = cv2.CAP_PROP_AUTO_WB, cv2.CAP_PROP_GAIN, cv2.CAP_PROP_GAMMA, cv2.CAP_PROP_SHARPNESS
-    OpencvCamera(SETTINGS, StandIn(absent=lacking)).close()
-    with pytest.raises(UserError, match="auto exposure cannot be set"):
-        OpencvCamera(SETTINGS, StandIn(absent=(cv2.CAP_PROP_AUTO_EXPOSURE,)))
-
-
-def test_frames_that_were_begun_before_are_thrown_away() -> None:
+def test_frames_that_were_begun_before_are_thrown_away_and_an_exposure_that_is_not_taken_is_told() -> None:
     camera = OpencvCamera(SETTINGS, StandIn())
     frames = [camera.expose(seconds) for seconds in (0.005, 0.015, 0.01)]
     assert [(frame.max(), real) for frame, real in frames] == [(50, 0.005), (150, 0.015), (100, 0.01)]
-
-
-def test_an_exposure_that_is_not_taken_is_told() -> None:
     capture = StandIn()
     camera = OpencvCamera(SETTINGS, capture)
     capture.controls[cv2.CAP_PROP_EXPOSURE] = 156.0

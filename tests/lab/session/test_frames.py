@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.lab import raw
 from holobench_eval.lab.session.frames import facts, find, read_frame
 from tests.support.bayer import bayer_dng
 
@@ -26,14 +27,11 @@ def test_sixteen_bits_come_back_as_they_were_counted(tmp_path, counts, ending):
     assert frame.top == 65535
 
 
-def test_a_colour_photograph_gives_the_channel_of_its_laser(tmp_path):
+def test_a_colour_photograph_gives_the_channel_of_its_laser_and_twelve_bits_their_step(tmp_path, counts):
     picture = np.zeros((8, 8, 3), np.uint8)
     picture[...] = (10, 20, 30)
     Image.fromarray(picture).save(tmp_path / "0001.png")
     assert [read_frame(tmp_path / "0001.png", colour).counts[0, 0] for colour in range(3)] == [10, 20, 30]
-
-
-def test_twelve_bits_at_the_upper_end_have_steps_of_sixteen(tmp_path, counts):
     cv2.imwrite(str(tmp_path / "0001.png"), counts << 4)
     assert facts(read_frame(tmp_path / "0001.png", 0)).step == 16
     cv2.imwrite(str(tmp_path / "0001.png"), counts)
@@ -72,14 +70,7 @@ def test_what_is_no_photograph_is_one_line(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-def test_two_files_for_one_photograph_are_refused(tmp_path):
-    for ending in (".png", ".tif"):
-        Image.new("L", (8, 8)).save(tmp_path / f"0001{ending}")
-    with pytest.raises(UserError, match="keep one of these"):
-        find(tmp_path, "0001")
-
-
-def test_a_tiff_without_its_size_is_one_line(tmp_path, counts):
+def test_a_tiff_without_its_size_and_two_files_for_one_photograph_are_one_line(tmp_path, counts):
     path = tmp_path / "0001.tif"
     Image.fromarray(counts).save(path)
     content = bytearray(path.read_bytes())
@@ -90,3 +81,47 @@ def test_a_tiff_without_its_size_is_one_line(tmp_path, counts):
     path.write_bytes(content)
     with pytest.raises(UserError, match="damaged"):
         read_frame(path, 0)
+    Image.new("L", (8, 8)).save(tmp_path / "0001.png")
+    with pytest.raises(UserError, match="keep one of these"):
+        find(tmp_path, "0001")
+
+
+MOSAIC = np.random.default_rng(4).integers(0, 16383, (64, 96), dtype=np.uint16)
+
+
+def read_raw(content: bytes, *name: str) -> raw.RawFrame:
+    pytest.importorskip("rawpy")
+    return raw.read_raw(content, *name)
+
+
+def test_counts_are_those_of_the_photosites_and_saturate_with_them() -> None:
+    frame = read_raw(bayer_dng(MOSAIC))
+    assert frame.counts.shape == (32, 48, 3)
+    assert frame.counts.dtype == np.uint16
+    assert np.array_equal(frame.counts[..., 0], MOSAIC[::2, ::2])
+    assert np.array_equal(frame.counts[..., 2], MOSAIC[1::2, 1::2])
+    greens = (MOSAIC[::2, 1::2].astype(float) + MOSAIC[1::2, ::2]) / 2
+    assert np.array_equal(frame.counts[..., 1], np.rint(greens))
+    assert frame.white == 16383
+    mosaic = np.full((64, 96), 1000, np.uint16)
+    mosaic[0, 1] = 16383
+    assert read_raw(bayer_dng(mosaic)).counts[0, 0].tolist() == [1000, 16383, 1000]
+
+
+@pytest.mark.parametrize("pattern", ["GRBG", "BGGR"])
+def test_colours_are_found_wherever_the_mosaic_begins(pattern: str) -> None:
+    frame = read_raw(bayer_dng(MOSAIC, pattern=bytes("RGB".index(letter) for letter in pattern)))
+    for plane, letter in ((0, "R"), (2, "B")):
+        row, column = divmod(pattern.index(letter), 2)
+        assert np.array_equal(frame.counts[..., plane], MOSAIC[row::2, column::2])
+
+
+def test_what_is_no_raw_file_is_refused_in_one_line() -> None:
+    picture = cv2.imencode(".jpg", np.zeros((64, 96, 3), np.uint8))[1].tobytes()
+    with pytest.raises(UserError, match=r"a\.cr2: a JPEG, whose values are not linear in light"):
+        read_raw(picture, "a.cr2")
+    for content in (b"", b"\x00" * 4096, bayer_dng(MOSAIC)[:5000], bayer_dng(MOSAIC)[:200]):
+        with pytest.raises(UserError, match=r"^a\.dng: not a RAW file that LibRaw can read \([A-Z][^\n']+\)$"):
+            read_raw(content, "a.dng")
+    with pytest.raises(UserError, match="Bayer"):
+        read_raw(bayer_dng(MOSAIC, pattern=bytes([0, 0, 1, 2])), "a.dng")

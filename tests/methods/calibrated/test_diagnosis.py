@@ -1,7 +1,5 @@
 """A learned model tells the same numbers however its gauge freedoms were used up, and tells those of its display."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import replace

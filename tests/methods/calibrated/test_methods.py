@@ -1,17 +1,16 @@
 """What calibrated methods promise: phases for any target without a capture, a training that a kill does not change,
 and plain Wirtinger holography on a display that has nothing to correct."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import pytest
 import torch
 from torch import Tensor
 
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import BudgetError, UserError
 from holobench_eval.display.api import Capture
 from holobench_eval.display.nominal import ideal_image
 from holobench_eval.display.training import TrainingBench, TrainingImage
@@ -20,12 +19,13 @@ from holobench_eval.methods.calibrated.hybrid import HybridModel
 from holobench_eval.methods.calibrated.kernel import LearnedKernel
 from holobench_eval.methods.calibrated.method import Calibrated, LargeSteps, SearchRetrieval
 from holobench_eval.methods.calibrated.parametric import ParametricModel
+from holobench_eval.methods.calibrated.phase_gamma import WirtingerGamma, curved
 from holobench_eval.methods.learned import fallback
 from holobench_eval.methods.learned.samples import Schedule
 from holobench_eval.methods.wirtinger import Wirtinger
-from tests.support.small_training import BentDisplay, Memory, pictures, small_spec, solving_bench, training_bench
+from tests.support import small_training as small
 
-SPEC = small_spec(32, 24, colours=3)
+SPEC = small.small_spec(32, 24, colours=3)
 SHORT: dict[str, Any] = {
     "training": Schedule(2, refine_images=1, steps=4, refine_steps=2),
     "retrieval": LargeSteps(iterations=3),
@@ -48,12 +48,10 @@ def _short_dark_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", ["parametric_model", "learned_kernel"])
-def test_captures_are_patterns_dark_ones_images_rounds_and_held_out_images_once_a_round_and_twice_for_the_fallback(
-    name: str,
-) -> None:
+def test_captures_are_patterns_images_rounds_and_held_out_images_twice_more_for_the_fallback(name: str) -> None:
     for patterns, rounds, held_out, switch in ((2, 2, 1, False), (0, 1, 2, True)):
-        memory = Memory()
-        bench = training_bench(SPEC, memory, images=3, held_out=held_out)
+        memory = small.Memory()
+        bench = small.training_bench(SPEC, memory, images=3, held_out=held_out)
         training = replace(SHORT["training"], rounds=rounds)
         replace(METHODS[name], patterns=patterns, training=training, fallback=switch).prepare(bench)
         dark = 3 if name == "parametric_model" else 0
@@ -63,19 +61,19 @@ def test_captures_are_patterns_dark_ones_images_rounds_and_held_out_images_once_
 
 @names
 def test_the_weights_of_another_method_are_refused_in_one_line(name: str) -> None:
-    (target,) = pictures(SPEC, first=20)
+    (target,) = small.pictures(SPEC, first=20)
     others = [other for other in METHODS if other != name and {name, other} != {"parametric_model", "hybrid_model"}]
     for other in others:
         learned = {**METHODS[other].approximator(SPEC).learned(), "fell_back": 0}
         with pytest.raises(UserError, match="not the weights of this") as caught:
-            METHODS[name].solve(target[None], solving_bench(METHODS[name], target, SPEC, learned))
+            METHODS[name].solve(target[None], small.solving_bench(METHODS[name], target, SPEC, learned))
         assert "\n" not in str(caught.value)
 
 
-class PlainDisplay(BentDisplay):
+class PlainDisplay(small.BentDisplay):
     """The nominal model as a display, without noise."""
 
-    def session(self, names: tuple[object, ...], target: Tensor) -> PlainDisplay:
+    def session(self, names: tuple[object, ...], target: Tensor) -> "PlainDisplay":
         return PlainDisplay(self.spec, self.fate, names)
 
     def announce(self, phases):
@@ -86,7 +84,7 @@ class PlainDisplay(BentDisplay):
         return Capture(frame, dark=0.0, white=float("inf"), gain=(1.0,) * len(frame))
 
 
-ONE = small_spec(48, 36)
+ONE = small.small_spec(48, 36)
 LEARNS: dict[str, Any] = {
     "training": Schedule(1, steps=60),
     "retrieval": LargeSteps(iterations=60),
@@ -96,9 +94,9 @@ LEARNS: dict[str, Any] = {
 }
 
 
-def calibrated_on(display: BentDisplay, method: Calibrated) -> Mapping[str, Any]:
-    given = [TrainingImage(f"picture {number}", one) for number, one in enumerate(pictures(ONE, 6))]
-    return method.prepare(TrainingBench(cast(Any, display), "small", given[:4], given[4:], Memory(), None, 3))
+def calibrated_on(display: small.BentDisplay, method: Calibrated) -> Mapping[str, Any]:
+    given = [TrainingImage(f"picture {number}", one) for number, one in enumerate(small.pictures(ONE, 6))]
+    return method.prepare(TrainingBench(cast(Any, display), "small", given[:4], given[4:], small.Memory(), None, 3))
 
 
 def test_a_display_without_faults_is_left_to_wirtinger_holography_where_the_switch_is_on() -> None:
@@ -106,17 +104,17 @@ def test_a_display_without_faults_is_left_to_wirtinger_holography_where_the_swit
     assert calibrated_on(PlainDisplay(ONE), replace(method, fallback=False))["fell_back"] == 0
     learned = calibrated_on(PlainDisplay(ONE), method)
     assert learned["fell_back"] == 1
-    target = pictures(ONE, first=30)
-    bench = solving_bench(method, target[0], ONE, learned)
+    target = small.pictures(ONE, first=30)
+    bench = small.solving_bench(method, target[0], ONE, learned)
     assert torch.equal(method.solve(target, bench), Wirtinger().solve(target, bench))
 
 
 def test_a_display_with_faults_is_corrected() -> None:
     method = ParametricModel(**LEARNS | {"training": Schedule(1, steps=120)})
-    learned = calibrated_on(BentDisplay(ONE), method)
+    learned = calibrated_on(small.BentDisplay(ONE), method)
     assert learned["fell_back"] == 0
-    (target,) = pictures(ONE, first=30)
-    bench, display = solving_bench(method, target, ONE, learned), BentDisplay(ONE)
+    (target,) = small.pictures(ONE, first=30)
+    bench, display = small.solving_bench(method, target, ONE, learned), small.BentDisplay(ONE)
     errors = []
     for way in (method, Wirtinger()):
         shown = display.rectified(display.capture(way.solve(target[None], bench)[0]), target)
@@ -131,5 +129,68 @@ def test_the_fallback_is_taken_by_the_mean_over_the_held_out_images(monkeypatch:
     monkeypatch.setattr(fallback, "WIRTINGER", Wirtinger(iterations=1))
     method = replace(METHODS["parametric_model"], fallback=True)
     for expected in (0, 1):
-        bench = training_bench(SPEC, Memory(), images=2, held_out=2)
+        bench = small.training_bench(SPEC, small.Memory(), images=2, held_out=2)
         assert method.prepare(bench)["fell_back"] == expected
+
+
+TWO = small.small_spec(colours=2)
+GAMMA = WirtingerGamma(images=2, of=Wirtinger(iterations=30))
+
+
+@dataclass
+class LutDisplay(small.BentDisplay):
+    """A display whose look-up table has an exponent."""
+
+    exponent: float = 1.0
+
+    def session(self, names: tuple[object, ...], target: Tensor) -> "LutDisplay":
+        return LutDisplay(self.spec, self.fate, names, self.exponent)
+
+    def capture(self, phase: Tensor) -> Capture:
+        self.fate.meets("photograph")
+        frame = ideal_image(curved(phase, self.exponent), self.spec)
+        return Capture(frame, dark=0.0, white=math.inf, gain=(1.0,) * len(frame))
+
+
+def bench(exponent: float, memory: small.Memory | None = None, budget: int | None = None) -> TrainingBench:
+    memory = memory or small.Memory()
+    images = [TrainingImage(f"image {number}", picture) for number, picture in enumerate(small.pictures(TWO, 4))]
+    display = cast(Any, LutDisplay(TWO, memory.fate, exponent=exponent))
+    return TrainingBench(display, "gamma", images[:3], images[3:], memory, budget, 1)
+
+
+@pytest.mark.parametrize("exponent", [0.8, 1.0, 1.4])
+def test_the_gamma_is_the_inverse_of_the_look_up_tables_exponent(exponent: float) -> None:
+    found = GAMMA.prepare(bench(exponent))["gamma"]
+    assert abs(math.log2(found * exponent)) <= 1 / 24 + 1e-6  # half a step of the search
+
+
+def test_it_takes_thirteen_captures_an_image_and_no_more() -> None:
+    exact = bench(1.2, budget=2 * 13)
+    GAMMA.prepare(exact)
+    assert exact.captures == 2 * 13
+    with pytest.raises(BudgetError):
+        GAMMA.prepare(bench(1.2, budget=2 * 13 - 1))
+
+
+def test_a_killed_search_goes_on_and_gives_the_same_gamma() -> None:
+    memory = small.Memory()
+    whole = GAMMA.prepare(bench(1.2, memory))
+    moments = len(memory.fate.passed)
+    for at in range(0, moments, 17):
+        again = small.Memory()
+        again.fate = small.Fate(at)
+        with pytest.raises(small.Killed):
+            GAMMA.prepare(bench(1.2, again))
+        again.fate = small.Fate()
+        resumed = bench(1.2, again)
+        assert GAMMA.prepare(resumed) == whole
+        assert resumed.captures == 2 * 13
+        assert again.story == memory.story
+
+
+def test_the_hologram_is_that_of_the_open_loop_method_curved() -> None:
+    (target,) = small.pictures(TWO, first=9)
+    phase = GAMMA.solve(target[None], small.solving_bench(GAMMA, target, TWO, {"gamma": 1.3}))
+    plain = GAMMA.of.solve(target[None], small.solving_bench(GAMMA.of, target, TWO, {}))
+    assert torch.equal(phase, math.tau * (plain.remainder(math.tau) / math.tau) ** 1.3)

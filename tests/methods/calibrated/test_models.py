@@ -1,7 +1,6 @@
-"""The models by themselves: what they are before they learn, and what they can and cannot learn."""
+"""Models and terms by themselves, and the patterns that they learn from."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -11,16 +10,20 @@ from torch import Tensor
 
 from holobench_eval.display.api import DisplaySpec, white_irradiance
 from holobench_eval.display.nominal import ideal_image
-from holobench_eval.methods.calibrated.approximator import ModelApproximator
+from holobench_eval.display.simulated.stages.stray_light import gaussian
+from holobench_eval.methods.calibrated.approximator import MODEL_BETAS, ModelApproximator
 from holobench_eval.methods.calibrated.cnn_prop_cnn import CNNPropCNN
 from holobench_eval.methods.calibrated.hybrid import HybridModel
 from holobench_eval.methods.calibrated.kernel import LearnedKernel
 from holobench_eval.methods.calibrated.networks import ColourByColour
 from holobench_eval.methods.calibrated.parametric import ParametricModel
-from holobench_eval.methods.calibrated.patterns import random_phase
+from holobench_eval.methods.calibrated.patterns import LENGTHS, pattern_samples, random_phase
+from holobench_eval.methods.calibrated.terms import Haze, ImageTerms, scattered, spread
+from holobench_eval.methods.descent import cosine_decay
 from holobench_eval.methods.learned.samples import Sample
+from holobench_eval.metrics.error_budget import unexplained
 from holobench_eval.optics import AngularSpectrum
-from tests.support.small_training import BentDisplay, pictures, small_spec
+from tests.support.small_training import BentDisplay, Memory, pictures, small_spec, training_bench
 
 SPEC = small_spec(48, 36, colours=2)
 LIGHT = torch.tensor([2.0, 3.0])
@@ -95,7 +98,7 @@ def test_a_model_of_the_panel_learns_what_a_kernel_cannot() -> None:
     errors = []
     for method in (LearnedKernel(), ParametricModel(), CNNPropCNN()):
         approximator = method.approximator(SPEC)
-        fit(approximator, learned_from, 200)
+        fit(approximator, learned_from, 120)
         errors.append(error(approximator, unseen))
     kernel, parametric, network = errors
     assert parametric < 0.2 * kernel
@@ -115,3 +118,107 @@ def test_a_network_sees_where_it_is_and_no_colour_but_its_own() -> None:
     assert torch.equal(changed[0], answer[0])
     assert not torch.equal(changed[1], answer[1])
     assert torch.allclose(network.requires_grad_(False)(seen), changed, atol=1e-5)  # held, it works colour by colour
+
+
+SQUARE = small_spec(48, 48)
+STEPS = 600
+
+
+def changed(intensity: Tensor) -> Tensor:
+    """Vignetting, a veil and a tone curve, each as the bench or a textbook has it, not as the terms do."""
+    height, width = intensity.shape[-2:]
+    y, x = torch.meshgrid(torch.linspace(-1, 1, height), torch.linspace(-1, 1, width), indexing="ij")
+    veil = torch.stack([gaussian(colour, 0.2 * height) for colour in intensity])
+    shaded = (0.6 * intensity + 0.4 * veil) / (1 + 0.3 * (x**2 + y**2)) ** 2
+    return 5 * shaded**0.8
+
+
+def test_they_begin_as_the_ideal_image() -> None:
+    for picture in pictures(SQUARE, 3):
+        held = ImageTerms(SQUARE)(picture).detach()
+        assert unexplained(held, picture, picture) < 0.02 * float(picture.var())
+
+
+def test_shading_haze_and_tone_are_learned_and_hold_for_a_picture_that_was_not_seen() -> None:
+    terms = ImageTerms(SQUARE)
+    optimiser = torch.optim.Adam(terms.parameters(), lr=3e-2, betas=MODEL_BETAS)
+    seen, unseen = pictures(SQUARE, 6), pictures(SQUARE, 1, first=50)[0]
+    for step in range(STEPS):
+        optimiser.param_groups[0]["lr"] = cosine_decay(3e-2, step / STEPS)
+        picture = seen[step % len(seen)]
+        loss = (terms(picture) - changed(picture)).square().mean() / changed(picture).square().mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+    before = unexplained(changed(unseen), unseen, unseen)
+    assert unexplained(changed(unseen), terms(unseen).detach(), unseen) < 0.02 * before
+    assert float(terms.gamma.detach().exp()) == pytest.approx(0.8, abs=0.08)
+
+
+def test_a_gaussian_keeps_its_light_inside_or_loses_what_is_spread_beyond_the_end() -> None:
+    widths = torch.tensor([0.3, 8.0])
+    inside, open_end = spread(64, widths, lossless=True), spread(64, widths)
+    assert torch.allclose(inside.sum(-1), torch.ones(2, 64))
+    assert float(open_end[1, 32].sum()) == pytest.approx(1, abs=1e-3)
+    assert float(open_end[1, 0].sum()) == pytest.approx(0.5 + 0.5 / (math.sqrt(math.tau) * 8), abs=1e-3)
+
+
+@pytest.mark.parametrize("width", [0.5, 4.0, 25.0, 200.0])
+def test_light_is_scattered_by_few_nodes_as_by_the_entire_gaussian(width: float) -> None:
+    image = torch.rand(2, 48, 64, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    rows, columns = (spread(side, torch.tensor([width], dtype=torch.float64))[0] for side in (48, 64))
+    assert torch.allclose(scattered(image, width), rows @ image @ columns.mT, atol=1e-7)
+
+
+def test_a_held_haze_is_that_which_was_learned() -> None:
+    haze, light = Haze(SQUARE), pictures(SQUARE, 1)[0]
+    learned = haze(light).detach()
+    assert torch.allclose(haze.requires_grad_(False)(light), learned, atol=1e-6)
+
+
+def test_a_dark_picture_has_finite_gradients() -> None:
+    terms = ImageTerms(small_spec(16, 16, colours=2))
+    terms(torch.zeros(2, 16, 16)).sum().backward()
+    assert all(bool(parameter.grad.isfinite().all()) for parameter in terms.parameters() if parameter.grad is not None)
+
+
+SHAPE = (160, 192)
+
+
+@pytest.mark.parametrize("length", [2.0, 4.0])
+def test_every_phase_value_is_equally_likely(length: float) -> None:
+    phase = random_phase(3, SHAPE, length, torch.Generator().manual_seed(0))
+    assert phase.shape == (3, *SHAPE)
+    assert phase.abs().max() <= math.pi + 1e-6
+    counts = torch.histc(phase, bins=8, min=-math.pi, max=math.pi) / phase.numel()
+    assert (counts - 1 / 8).abs().max() < 0.03
+
+
+@pytest.mark.parametrize("length", [2.0, 4.0, 8.0])
+def test_neighbours_agree_within_the_correlation_length_and_not_beyond(length: float) -> None:
+    field = torch.polar(torch.tensor(1.0), random_phase(3, SHAPE, length, torch.Generator().manual_seed(0)))
+
+    def agreement(distance: int) -> float:
+        return float((field[:, distance:] * field[:, :-distance].conj()).mean().abs())
+
+    assert agreement(1) > 0.75
+    assert 0.5 < agreement(int(length)) < 0.8
+    assert agreement(int(5 * length)) < 0.25
+
+
+def test_patterns_and_colours_differ_go_through_the_correlation_lengths_and_are_captured_once() -> None:
+    spec, memory = small_spec(64, 48, colours=2), Memory()
+    bench = training_bench(spec, memory)
+    samples = pattern_samples(bench, 5)
+    assert bench.captures == 5
+    phases = [phase for sample in samples for phase in sample.phase]
+    assert len({float(phase.double().sum()) for phase in phases}) == 10
+    steps = [float((torch.polar(torch.ones(()), phase.diff(dim=-1)) - 1).abs().mean()) for phase in phases[::2]]
+    assert steps[:4] == sorted(steps[:4], reverse=True)
+    assert steps[4] == pytest.approx(steps[0], rel=0.1)
+    assert len(LENGTHS) == 4
+    assert {float(sample.target.unique()) for sample in samples} == {0.25}  # the camera is exposed for gray
+    again = pattern_samples(training_bench(spec, memory), 5)
+    assert memory.fate.passed == []
+    for one, other in zip(samples, again, strict=True):
+        assert torch.equal(one.capture, other.capture)

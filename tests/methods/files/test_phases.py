@@ -1,7 +1,5 @@
 """A hologram from a file is the one that was written, whatever its form and convention, or is refused in one line."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -277,9 +275,7 @@ def wrong_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("small.npy", {"amplitude": "gone.npy"}, "3 x 11 x 12"),
     ],
 )
-def test_a_wrong_file_is_refused_in_one_line(
-    wrong_files: Path, name: str, params: dict[str, Any], message: str
-) -> None:
+def test_a_wrong_file_is_refused_in_one_line(wrong_files: Path, name, params: dict[str, Any], message) -> None:
     if "correction" in params:
         params = {"correction": {"file": params["correction"]["file"].replace("FOLDER", str(wrong_files))}}
     with pytest.raises(CellError, match=message) as found:
@@ -291,9 +287,7 @@ def test_a_wrong_file_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("script", "message"), [("kill -ABRT $$", "damaged: its reader ends with -6"), ("exec sleep 20", "within 0.5 s")]
 )
-def test_a_reader_that_crashes_or_does_not_end_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, message: str
-) -> None:
+def test_a_reader_that_crashes_or_does_not_end_is_one_line(tmp_path, monkeypatch, script: str, message) -> None:
     reader = tmp_path / "reader"
     reader.write_text(f"#!/bin/sh\n{script}\n")
     reader.chmod(0o700)

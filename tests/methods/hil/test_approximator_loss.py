@@ -1,7 +1,5 @@
 """Training lowers the loss it says, touches nothing else, and goes on from a saved state as if never stopped."""
 
-from __future__ import annotations
-
 import copy
 import io
 from typing import Any
@@ -186,26 +184,20 @@ def test_networks_are_trained_with_their_published_losses(monkeypatch: pytest.Mo
     assert published_loss(Network("pix2pixhd")).perceptual == 10
 
 
-def test_a_loss_without_a_discriminator_to_ask_is_refused() -> None:
+def test_wrong_weights_and_a_loss_without_a_discriminator_to_ask_are_refused() -> None:
+    for params in ({"l1": -1}, {"adversarial": float("nan")}, {"l2": float("inf")}, {"gan": "wgan"}):
+        with pytest.raises(ValidationError):
+            TypeAdapter(ApproximatorLoss).validate_python(params)
     with pytest.raises(UserError, match="'unet' has no discriminator; set 'adversarial' to 0"):
         small("unet", ApproximatorLoss())
     with pytest.raises(UserError, match="every weight is 0"):
         ApproximatorLoss(0, 0, 0, 0)
 
 
-@pytest.mark.parametrize("params", [{"l1": -1}, {"adversarial": float("nan")}, {"l2": float("inf")}, {"gan": "wgan"}])
-def test_wrong_weights_are_refused(params: dict[str, Any]) -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(ApproximatorLoss).validate_python(params)
-
-
-def test_images_that_do_not_belong_together_are_refused() -> None:
-    with pytest.raises(ValueError, match="differ in shape"):
-        small().step(pair()[0], pair(size=48)[1])
-
-
-def test_a_state_that_does_not_fit_is_refused_in_one_line() -> None:
+def test_images_of_two_shapes_and_a_state_that_does_not_fit_are_refused() -> None:
     training = small()
+    with pytest.raises(ValueError, match="differ in shape"):
+        training.step(pair()[0], pair(size=48)[1])
     training.step(*pair())
     state: Any = training.state_dict()
     moments = copy.deepcopy(state)
@@ -217,9 +209,11 @@ def test_a_state_that_does_not_fit_is_refused_in_one_line() -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_a_discriminator_learns_to_tell_predictions_from_captures() -> None:
+def test_a_discriminator_learns_to_tell_predictions_from_captures_in_steps_of_its_own() -> None:
     training = small()
     ideal, capture = pair()
+    training._step_generator(training.generator(ideal), ideal, capture)
+    assert all(value.grad is None for value in training.discriminator.parameters())
     fake = torch.zeros_like(capture)
     losses = [training._step_discriminator(fake, ideal, capture) for _ in range(30)]
     assert losses[-1] < 0.5 * losses[0]
@@ -238,10 +232,3 @@ def test_moments_are_laid_out_as_the_weights() -> None:
     resumed.load_state_dict(state)
     assert training.step(*pair(1)) == resumed.step(*pair(1))
     assert same(weights(training), weights(resumed))
-
-
-def test_the_generators_step_leaves_no_gradient_in_the_discriminator() -> None:
-    training = small()
-    ideal, capture = pair()
-    training._step_generator(training.generator(ideal), ideal, capture)
-    assert all(value.grad is None for value in training.discriminator.parameters())

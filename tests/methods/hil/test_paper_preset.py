@@ -1,10 +1,8 @@
 """The paper's network at the paper's size fits into the memory of one accelerator of its time, 24 GB, on a CPU too.
 
-Arrays grow with the pixels, and weights do not. So what a step on fewer pixels takes beside libraries and weights is
-an upper bound of what a step takes, once it is multiplied by the ratio of the pixels.
+Arrays grow with the pixels, and weights do not. So what a step on fewer pixels takes beside libraries, weights, their
+gradients and two moments is an upper bound of what a step takes, once it is multiplied by the ratio of the pixels.
 """
-
-from __future__ import annotations
 
 import json
 import os
@@ -15,7 +13,7 @@ from pathlib import Path
 import pytest
 
 LIMIT = 24e9
-PADDED = 1280 * 2048 / (512 * 512)  # pixels inside the network, of the paper's size and here
+PADDED = 1280 * 2048 / (256 * 256)  # pixels inside the network, of the paper's size and here
 TRAIN_AND_RETRIEVE = """
 import json, resource
 
@@ -35,7 +33,7 @@ from holobench_eval.methods.learned.retrieval import PhaseRetrieval, retrieve
 
 torch.set_num_threads(1)
 spec = DisplaySpec(
-    "small", (384, 384), 6.4e-6, (636e-9, 517e-9, 446e-9), 0.1, 8, 0.8, Region(0, 0, 384, 384)
+    "small", (192, 192), 6.4e-6, (636e-9, 517e-9, 446e-9), 0.1, 8, 0.8, Region(0, 0, 192, 192)
 )
 (target,) = pictures(spec)
 phase = 4 * target.flip(-1)
@@ -45,8 +43,10 @@ approximator.expose([sample])
 before = peak()
 losses = approximator.step(sample, 0.0)
 found = retrieve(approximator.image(sample.light), target, phase, PhaseRetrieval(iterations=1), approximator.verdict)
+modules = (approximator.trainer.generator, approximator.trainer.discriminator, approximator.critic.network)
+learned = 3 * sum(value.nbytes for module in modules for value in module.parameters())
 found = {"shape": list(found.shape), "finite": bool(found.isfinite().all())}
-print(json.dumps({"losses": losses, "before": before, "peak": peak(), **found}))
+print(json.dumps({"losses": losses, "before": before + learned, "peak": peak(), **found}))
 """
 
 
@@ -60,6 +60,6 @@ def test_a_training_step_and_a_retrieval_stay_below_24_gigabytes_at_full_size(tm
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout)
     assert found["before"] + PADDED * (found["peak"] - found["before"]) < LIMIT
-    assert found["shape"] == [3, 384, 384]
+    assert found["shape"] == [3, 192, 192]
     assert found["finite"]
     assert all(found["losses"][name] > 0 for name in ("l1", "perceptual", "adversarial", "discriminator", "judge"))

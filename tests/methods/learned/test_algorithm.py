@@ -1,7 +1,5 @@
 """Algorithm 1: who is captured when, and that a training killed anywhere ends as one that was not."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any
@@ -57,6 +55,10 @@ class Scale:
         self.weight, self.moment, self.unit = state["weight"], state["moment"], state["unit"]
 
 
+def even(value: float) -> Sample:
+    return Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1))
+
+
 def begin(image: TrainingImage) -> Tensor:
     return torch.full((1, *SPEC.shape), float(image.target.mean()))
 
@@ -76,12 +78,10 @@ def _saves_often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
 
 
-@pytest.mark.parametrize("refine_images", [None, 1, 2, 9])
-@pytest.mark.parametrize("used", [None, 2])
-@pytest.mark.parametrize("held_out", [1, 2])
-def test_captures_are_all_images_then_some_a_round_and_those_held_out(
-    refine_images: int | None, used: int | None, held_out: int
-) -> None:
+@pytest.mark.parametrize(
+    ("refine_images", "used", "held_out"), [(None, None, 1), (1, 2, 2), (2, None, 1), (9, 2, 2), (9, None, 2)]
+)
+def test_captures_are_all_images_then_some_a_round_and_those_held_out(refine_images, used, held_out) -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory, images=3, held_out=held_out)
     run(bench, Schedule(3, used, refine_images, steps=4, refine_steps=2), memory)
@@ -121,9 +121,7 @@ def test_a_round_learns_from_all_captures_so_far_or_from_its_own(keep_captures: 
 def test_samples_from_before_are_learned_from_in_every_round(keep_captures: bool) -> None:
     memory = Memory()
     bench, approximator = training_bench(SPEC, memory), Scale(memory.fate)
-    earlier = [
-        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (5.0, 6.0)
-    ]
+    earlier = [even(value) for value in (5.0, 6.0)]
     rounds = Schedule(2, refine_images=1, steps=5, refine_steps=10, keep_captures=keep_captures)
     train(bench, approximator, begin, search, rounds, earlier)
     assert approximator.exposed == [5]
@@ -161,9 +159,8 @@ def test_the_first_round_shows_the_start_and_later_ones_search_from_it() -> None
     memory = Memory()
     bench = training_bench(SPEC, memory)
     run(bench, Schedule(2, steps=2, refine_steps=2), memory)
-    start, first, second = (
-        memory.load(f"{name} picture 0") for name in ("start", "phase of round 1", "phase of round 2")
-    )
+    names = ("start", "phase of round 1", "phase of round 2")
+    start, first, second = (memory.load(f"{name} picture 0") for name in names)
     assert torch.equal(start["value"]["phase"], begin(bench.images[0]))
     assert torch.equal(first["value"]["phase"], start["value"]["phase"])
     assert not torch.equal(second["value"]["phase"], start["value"]["phase"])
@@ -234,9 +231,7 @@ def test_a_row_tells_the_mean_loss_since_the_row_earlier() -> None:
         return {"error": losses[-1], "nothing": 0.0}
 
     approximator.step = recorded  # type: ignore[method-assign]
-    samples = [
-        Sample(torch.zeros(1), torch.full((1, 2, 2), value), torch.zeros(1), torch.ones(1)) for value in (1.0, 2.0)
-    ]
+    samples = [even(value) for value in (1.0, 2.0)]
     kept = Checkpoint(bench, approximator, Schedule(1, steps=8))
     for _ in kept.rounds(1):
         for sample, progress in kept.steps(samples, 8):

@@ -1,7 +1,6 @@
 """Every term of Eq. 22 is what it says, and retrieval is descent on their sum from a start."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,10 +9,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from holobench_eval.core.errors import Pending
 from holobench_eval.methods.hil.critic import Critic
 from holobench_eval.methods.hil.networks import Network
 from holobench_eval.methods.learned import retrieval
 from holobench_eval.methods.learned.retrieval import Image, PhaseRetrieval, PictureLoss, left_out, matched, retrieve
+from holobench_eval.methods.learned.samples import Sample, together
 from holobench_eval.metrics.feature_distance import mofd
 from holobench_eval.metrics.ms_ssim import ms_ssim
 from holobench_eval.optics import srgb_encode
@@ -106,9 +107,8 @@ def test_a_black_prediction_and_a_black_target_have_a_finite_gradient() -> None:
     target, image = pair()
     for one, other in ((torch.zeros_like(image), target), (image, torch.zeros_like(target))):
         shown = one.clone().requires_grad_()
-        (gradient,) = torch.autograd.grad(
-            PictureLoss(other, PhaseRetrieval(), double_critic().verdict)(shown)[0], shown
-        )
+        value, _ = PictureLoss(other, PhaseRetrieval(), double_critic().verdict)(shown)
+        (gradient,) = torch.autograd.grad(value, shown)
         assert gradient.isfinite().all()
 
 
@@ -207,3 +207,24 @@ def test_the_best_phase_is_kept_when_later_ones_are_worse() -> None:
     best = errors.index(min(errors))
     assert best < len(errors) - 1
     assert torch.equal(phase, display.seen[best])
+
+
+SAMPLE = Sample(*(torch.zeros(1),) * 4)
+
+
+def kind(name: str, asked: list[str], waits: bool) -> Callable[[], Sequence[Sample]]:
+    def make() -> Sequence[Sample]:
+        asked.append(name)
+        if waits:
+            raise Pending(name)
+        return [SAMPLE]
+
+    return make
+
+
+def test_every_kind_is_asked_for_before_the_first_that_waits_says_so() -> None:
+    asked: list[str] = []
+    with pytest.raises(Pending, match=r"^b$"):
+        together(kind("a", asked, False), kind("b", asked, True), kind("c", asked, True))
+    assert asked == ["a", "b", "c"]
+    assert together(kind("a", [], False), kind("b", [], False)) == [SAMPLE, SAMPLE]

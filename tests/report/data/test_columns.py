@@ -1,9 +1,8 @@
 """Names and meanings of the columns of a report's files, and what a column more takes."""
 
-from __future__ import annotations
-
 import csv
 import math
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -15,7 +14,7 @@ from holobench_eval.report.data import columns
 from holobench_eval.report.data.column import Cells, Column, Record, column, if_known, mean
 from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
-from holobench_eval.report.files.dictionary import File
+from holobench_eval.report.files.dictionary import File, dictionary
 from holobench_eval.report.files.dictionary import column as described
 from holobench_eval.report.page.data import page_data
 from holobench_eval.report.section import Report
@@ -79,13 +78,10 @@ def test_every_metric_of_the_catalogue_has_an_entry_with_its_unit(end: str) -> N
             assert not metric.unit or found.name.endswith(f"_{metric.unit.lower()}")
 
 
-def test_a_column_that_the_dictionary_lacks_is_found_out() -> None:
+def test_an_entry_says_what_a_difference_is_of_and_a_column_that_the_dictionary_lacks_is_found_out() -> None:
     scores = ("glare", "psnr_linear_glare_db", "psnr_linear_lo_db")
     for file, name in (("tests.csv", "psnr_linear_db"), *(("records.csv", name) for name in scores)):
         assert described(file, name) is None
-
-
-def test_an_entry_says_what_a_difference_is_a_difference_of() -> None:
     found = described("tests.csv", "difference_lo_db")
     assert found is not None
     assert (found.unit, found.kind) == ("dB", "number")
@@ -127,3 +123,25 @@ def test_a_figure_of_a_run_takes_one_entry(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(records_frame(committed, budget.layout()), results.frame)
     without = budget.results()  # a figure that no record has is in no file
     assert "energy_j" not in {*without.frame, *without.table}
+
+
+def test_every_column_of_a_report_is_described_once_and_in_its_order(tmp_path: Path) -> None:
+    _, results = write_report(budget.layout(), budget.study(), tmp_path, {}, Description())
+    text = (tmp_path / "columns.md").read_text()
+    assert "Not described" not in text
+    for file in ("records.csv", "table.csv", "tests.csv"):
+        (section,) = re.findall(rf"## {file}\n\n(.*?)(?:\n\n|\Z)", text, re.DOTALL)
+        described = re.findall(r"^\| `(.+?)` \|", section, re.MULTILINE)
+        assert ",".join(described) == (tmp_path / file).read_text().splitlines()[0]
+    assert "| `solving_s` | Time to solve the target, of the solving that made the phase, in this run" in text
+    assert results.headline.key in text
+
+
+def test_the_name_of_a_published_metric_stays_text_and_a_column_without_an_entry_says_so() -> None:
+    name = "reported_<script>|[x](y)"
+    text = dictionary({"table.csv": pd.DataFrame({name: [1.0]})})
+    assert "| `reported_<script>\\|[x](y)` | Published figure of the metric" in text
+    assert text.count("script") == 1
+
+    frame = pd.DataFrame({"glare|<b>": [1.0]})
+    assert "| `glare\\|<b>` | Not described |  | number |" in dictionary({"records.csv": frame})

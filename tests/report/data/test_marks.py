@@ -1,16 +1,13 @@
 """A row says what its number hides: a fallback that was taken, a network that predicts worse than none."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import pytest
 
+from holobench_eval.report import Results, csv_text, read_records
 from holobench_eval.report.data.board import board
-from holobench_eval.report.data.phrases import marked
-from holobench_eval.report.data.results import Results
-from holobench_eval.report.data.tables import csv_text, read_records
+from holobench_eval.report.data.phrases import marked, uncovered
 from holobench_eval.study.plan import REFERENCE
 from tests.support.synthetic_study import TARGETS, cell, record
 from tests.support.synthetic_study import results as of_records
@@ -41,9 +38,7 @@ def results(network: float, identity: float, constant: float, measure: str = "pr
         (17.0, 19.0, 18.0, ", not trained to convergence: below the constant image and the ideal image"),
     ],
 )
-def test_a_network_that_predicts_worse_than_no_training_is_marked(
-    network: float, identity: float, constant: float, mark: str
-) -> None:
+def test_a_network_that_predicts_worse_than_no_training_is_marked(network, identity, constant, mark) -> None:
     found = results(network, identity, constant)
     assert marked(found, "U-Net", DISPLAY) == f"U-Net{mark}"
     assert marked(found, "Identity", DISPLAY) == "Identity"  # it has nothing to learn
@@ -83,9 +78,7 @@ def test_a_fallback_stands_in_the_row_and_survives_the_file_of_records() -> None
         (30.0, 2.0, 9, ""),  # nothing is known of the display without photographs
     ],
 )
-def test_a_network_without_photographs_is_dominated_by_what_is_as_fast_and_not_worse(
-    score: float, seconds: float, photographs: int, mark: str
-) -> None:
+def test_a_network_without_photographs_is_dominated_by_what_is_as_fast(score, seconds, photographs, mark) -> None:
     rows = {"Network": (score, seconds), "Steps": (31.0, 1.0), "Many steps": (40.0, 9.0)}
     learned = {"learned": {"sha256": "2" * 64, "captures": photographs, "seconds": 1.0}}
     records = [
@@ -96,3 +89,22 @@ def test_a_network_without_photographs_is_dominated_by_what_is_as_fast_and_not_w
     ]
     found = of_records(records, trained=frozenset({"Network"}))
     assert [marked(found, label, DISPLAY) for label in rows] == [f"Network{mark}", "Steps", "Many steps"]
+
+
+def reading(label: str, *files: str) -> dict[str, Any]:
+    return {"label": label, "uncovered": list(files)}
+
+
+def test_files_that_no_cell_is_named_after_are_told_once_and_installed_ones_are_not() -> None:
+    library = "/usr/lib/python3.11/site-packages/scipy/io/wavfile.py"
+    records = [
+        reading("mine", "/data/k.json", library),
+        reading("mine", "/data/k.json"),
+        reading("other", library),
+        {"label": "x"},
+    ]
+    text = uncovered(records)
+    assert text.startswith("Not covered: mine reads /data/k.json: a change there is not noticed")
+    assert "scipy" not in text
+    assert uncovered(records[2:]) == ""
+    assert "\x1b" not in uncovered([reading("mine", "/data/\x1b[2J.json")])  # which a terminal would obey

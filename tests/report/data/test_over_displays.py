@@ -1,7 +1,5 @@
 """Margins over many displays, what of a display goes with them, and what two shares of its error tell of methods."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -64,13 +62,10 @@ def test_the_answer_says_on_how_many_displays_by_how_much_and_where_the_publishe
     assert (tmp_path / "chart.png").stat().st_size > 5000
 
 
-def test_few_displays_are_answered_each_by_itself():
+def test_few_displays_and_oracles_alone_are_no_comparison_over_displays():
     few = DISPLAYS[: FEWEST_DISPLAYS - 1]
     results = results_of({f"{label}@{name}": 17.0 for name in few for label in ("old", "new")})
     assert kind_of(results) is not over_displays.KIND
-
-
-def test_oracles_alone_are_no_comparison_over_displays():
     means = {f"{label}@{name}": 17.0 for name in DISPLAYS for label in ("old", "new")}
     assert kind_of(results_of(means, privileged=frozenset({"new"}))) is not over_displays.KIND
     assert kind_of(results_of(means)) is over_displays.KIND
@@ -93,12 +88,9 @@ def test_the_parameter_that_decides_is_found_and_chance_predicts_nothing_of_a_di
     assert found.rho > 0.99
     assert found.explained > 0.99
     draw = np.random.default_rng(1)
-    explained = [cause(draw.normal(size=10), parameters(results)).explained for _ in range(50)]
-    assert np.median(explained) < 0
-
-
-def test_displays_of_no_family_have_no_parameters():
-    assert parameters(study(profiles={name: load_profile("ideal") for name in DISPLAYS})) == {}
+    known = parameters(results)
+    assert np.median([cause(draw.normal(size=10), known).explained for _ in range(50)]) < 0
+    assert parameters(study(profiles={name: load_profile("ideal") for name in DISPLAYS})) == {}  # of no family
 
 
 LINKS = {"terms": 0.5, "field": 0.1}  # what the models leave of the error, less a display's own share of it
@@ -171,7 +163,7 @@ def test_a_display_left_out_is_predicted_as_by_a_fit_without_it() -> None:
 def test_shares_that_decide_nothing_explain_nothing() -> None:
     draw = np.random.default_rng(2)
     explained = []
-    for _ in range(8):
+    for _ in range(5):
         gains = dict(zip(DISPLAYS, draw.normal(size=10), strict=True))
         found = display_map(replace(study(gains.__getitem__), related={"budget": budget()}))
         assert found is not None
@@ -215,11 +207,8 @@ def test_related_studies_of_many_displays_answer_with_means_over_them() -> None:
     by_psnr, by_control = kind_of(of_models).answer(of_models)
     assert by_psnr == "By PSNR other leads on 10 of 10 displays; its mean over 10 is 25.00 dB."
     assert by_control.startswith("By control new leads on 10 of 10 displays; its mean over 10 is 0.900")
-    assert (
-        str(kind_of(of_models).table(board(of_models)))
-        .splitlines()[2]
-        .startswith("| new | 20.00 | 20.00 to 20.00 | 0.900")
-    )
+    first = str(kind_of(of_models).table(board(of_models))).splitlines()[2]
+    assert first.startswith("| new | 20.00 | 20.00 to 20.00 | 0.900")
     assert len(str(kind_of(of_errors).table(board(of_errors))).splitlines()) == 2 + 5
 
 

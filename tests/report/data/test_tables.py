@@ -1,13 +1,37 @@
+"""Layouts and tables: what a config orders, and what stands in the files of a report."""
+
 import io
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import Results, csv_text, read_records, recompute_files, records_frame, table_from_records
-from holobench_eval.study.plan import FLOORS, REFERENCE
+from holobench_eval.report import (
+    Results,
+    build_report,
+    committed_records,
+    csv_text,
+    difference,
+    layout_of,
+    read_records,
+    recompute_files,
+    records_frame,
+    table_from_records,
+)
+from holobench_eval.report.data.scores import order_scores, parse
+from holobench_eval.report.data.statistics import Estimate
+from holobench_eval.report.description import describe
+from holobench_eval.study.config import load_study
+from holobench_eval.study.plan import FLOORS, REFERENCE, plan
+from tests.study.studies import compute
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import files
+from tests.support.studies.fake_study import PLUGINS, write_config
 
 PLAIN = synthetic.layout(
     pairs=(("b", "bench"), ("a", "bench")), targets=("t2", "t1"), baseline="b", reported={}, privileged=frozenset()
@@ -56,11 +80,6 @@ def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
     assert narrow["clusters"] == 6
 
 
-def test_targets_keep_the_order_of_the_dataset():
-    frame = records_frame(rows({"t1": 1.0, "t2": 2.0}), PLAIN)
-    assert list(frame["target"]) == ["t2", "t1"]
-
-
 def test_cells_without_a_score_are_counted_and_are_in_no_mean():
     lost = rows({"t1": 0.0, "t2": 0.0}, label="b", state="unavailable", reason="needs a camera")
     failed = rows({"t1": 1.0}, state="failed", reason="no light")
@@ -85,8 +104,10 @@ def test_a_metric_that_some_targets_lack_has_no_mean():
     assert row["speckle_contrast"] == 0.3
 
 
-def test_numbers_have_six_significant_digits():
-    text = csv_text(records_frame(rows({"t1": 12.3456789}, seconds=1 / 3), PLAIN))
+def test_numbers_have_six_significant_digits_and_targets_the_order_of_the_dataset():
+    frame = records_frame(rows({"t1": 12.3456789, "t2": 2.0}, seconds=1 / 3), PLAIN)
+    assert list(frame["target"]) == ["t2", "t1"]
+    text = csv_text(frame)
     assert ",12.3457," in text
     assert ",0.333333," in text
 
@@ -128,13 +149,10 @@ def test_labels_survive_being_written_and_read(label):
     assert csv_text(read_records(text)) == text
 
 
-def test_a_reason_with_line_breaks_stays_on_its_row():
+def test_a_reason_with_line_breaks_stays_on_its_row_and_a_score_named_like_a_column_is_refused():
     frame = records_frame(rows({"t1": 1.0}, state="failed", reason="first\nsecond,\r\nthird"), PLAIN)
     read = pd.read_csv(io.StringIO(csv_text(frame)))
     assert list(read["reason"]) == ["first second, third"]
-
-
-def test_a_score_named_like_a_column_is_refused():
     bad = rows({"t1": 1.0})
     bad[0]["scores"]["captures"] = 1.0
     with pytest.raises(UserError, match="captures"):
@@ -148,3 +166,164 @@ def test_published_figures_have_columns_of_their_own_beside_the_display_they_bel
     assert np.isnan(row_of(table, "GS")["reported_psnr_db"])
     assert row_of(table, "HIL")["psnr_linear_db"] != 20.5
     assert set(table[table["reported_psnr_db"].notna()]["condition"]) == {"leto-aged"}
+
+
+def test_a_key_is_read_as_metric_domain_and_variant():
+    score = parse("ms_ssim_amplitude")
+    assert (score.metric, score.domain, score.variant) == ("ms_ssim", "amplitude", "")
+    assert parse("psnr_linear_refined").variant == "refined"
+    assert parse("speckle_contrast").domain == ""
+    widths = {"psnr_linear_blur0.5": 0.5, "ssim_linear_blur1": 1.0, "psnr_linear": None}
+    assert {key: parse(key).blur for key in widths} == widths
+
+
+def test_distances_are_better_when_lower_and_similarities_when_higher():
+    for key in ("mofd_srgb", "gmsd_srgb", "lpips_alex_srgb", "flip_srgb", "speckle_contrast"):
+        assert parse(key).better(0.1, 0.2), key
+    assert parse("psnr_linear").better(20.0, 17.0)
+    assert parse("ssim_linear_blur1").better(0.6, 0.5)
+
+
+def test_values_carry_unit_and_digits_of_their_metric():
+    assert parse("psnr_linear").with_unit(17.618) == "17.62 dB"
+    assert parse("psnr_linear").with_unit(1.2, signed=True) == "+1.20 dB"
+    assert parse("ssim_linear").estimate(Estimate(0.4751, 0.41, 0.52, 8, 8)) == "0.475 [0.410, 0.520]"
+    assert parse("ssim_linear").estimate(Estimate(0.4751, float("nan"), float("nan"), 2, 2)) == "0.475"
+    assert parse("psnr_linear").number(float("nan")) == "–"
+    assert parse("psnr_linear").number(-0.0001, signed=True) == "+0.00"
+
+
+def test_plain_metrics_come_before_variants_and_descriptions():
+    keys = ["efficiency", "psnr_linear_blur1", "ssim_linear", "psnr_srgb", "psnr_linear", "mofd_srgb"]
+    ordered = order_scores(keys)
+    assert ordered == ["psnr_linear", "psnr_srgb", "ssim_linear", "mofd_srgb", "psnr_linear_blur1", "efficiency"]
+    assert order_scores(reversed(keys)) == ordered
+
+
+CONFIG = """
+title: Two methods
+seed: 7
+display: {profiles: [ideal, leto-aged], panel: [128, 128]}
+targets: {dataset: "plugins.py:Gray", params: {count: 11}}
+methods:
+  - {name: "plugins.py:Toy", label: honest}
+  - {name: "plugins.py:Following", label: knowing, profiles: [leto-aged]}
+  - {name: "plugins.py:Seeing", label: seeing, profiles: [ideal], captures: 12, params: {value: 0.25}}
+headline: ssim_linear
+isolation: none
+reported: {source: "a paper, table 3", rows: {honest: {psnr: 17.6}}}
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "plugins.py").write_text(PLUGINS)
+    (folder / "study.yaml").write_text(CONFIG)
+    return load_study(folder / "study.yaml")
+
+
+@pytest.fixture(scope="module")
+def layout(study):
+    return layout_of(study)
+
+
+def test_a_layout_holds_what_the_config_orders(layout):
+    assert layout.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"), ("seeing", "ideal"))
+    assert layout.targets == tuple(f"gray {number}" for number in range(11))  # and not by the alphabet
+    assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
+    assert layout.privileged == {"knowing"}
+    assert layout.camera == {"seeing"}
+    assert [layout.category(label) for label in layout.methods] == ["open loop", "oracle", "online"]
+    assert (layout.reported_metrics, layout.reported_source) == (("psnr",), "a paper, table 3")
+
+
+def test_a_layout_knows_how_every_cell_of_the_plan_is_made(study, layout):
+    cells = [(label, one) for label, one in plan(study).labelled() if label in layout.methods]
+    assert len(cells) == 44
+    for label, one in cells:
+        assert layout.params[label] == one.params
+        assert layout.capture_limits.get(label) == one.captures
+        assert layout.panels[one.profile] == one.panel
+        assert layout.seed == one.seed
+    assert layout.params["seeing"] == {"value": 0.25, "pause": 0.0, "fail": ""}
+    assert (layout.study, layout.capture_limits) == ("study", {"seeing": 12})
+
+
+def test_clusters_are_those_of_the_dataset_and_rows_whose_network_is_the_ideal_image_are_known(tmp_path, layout):
+    assert (layout.clusters, layout.identities) == ({}, set())
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    crops = "targets: {dataset: crops, params: {names: [astronaut], each: 2, renderings: 1}}"
+    network = '{name: hil, label: "%s", params: {network: {name: %s}}}'
+    methods = f"  - {network % ('none', 'identity')}\n  - {network % ('some', 'unet')}\n"
+    config = CONFIG.replace("headline:", methods + "training: {dataset: dead_leaves}\nheadline:")
+    (tmp_path / "study.yaml").write_text(re.sub("targets: .*", crops, config))
+    changed = layout_of(load_study(tmp_path / "study.yaml"))
+    assert changed.clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life"}
+    assert changed.identities == {"none"}
+
+
+def test_a_network_competes_by_whether_its_training_takes_photographs(tmp_path):
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    names = ("holonet", "ccnn", "tensor_holography", "unet_phase")
+    nets = "".join(
+        f"  - {{name: {name}, label: {name} {through}, params: {{through: {through}}}}}\n"
+        for name in names
+        for through in ("ideal", "parametric_model")
+    )
+    config = CONFIG.replace("headline:", nets + "  - hil\ntraining: {dataset: dead_leaves}\nheadline:")
+    (tmp_path / "study.yaml").write_text(config)
+    layout = layout_of(load_study(tmp_path / "study.yaml"))
+    assert [layout.category(f"{name} ideal") for name in names] == ["open loop"] * 4
+    assert [layout.category(f"{name} parametric_model") for name in names] == ["calibrated"] * 4
+    assert layout.category("hil") == "calibrated"
+    assert replace(layout, camera=frozenset()).spends_captures
+    blind = replace(layout, camera=frozenset(), trained=layout.blind)
+    assert not blind.spends_captures
+
+
+def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):
+    description = describe(study)
+    assert description.config_file == "study.yaml"  # of a config outside the working folder, no folder
+    ideal, aged = description.displays
+    assert "Version 1, sha256 " in ideal.heading
+    assert any("128 x 128" in line for line in ideal.lines)
+    assert not any(line.startswith("crosstalk") for line in ideal.lines)
+    assert any(line.startswith("crosstalk") for line in aged.lines)
+
+
+pytestmark = pytest.mark.usefixtures("no_physics")
+
+
+def test_a_report_from_records_csv_has_the_same_bytes_and_keeps_its_pictures(tmp_path: Path) -> None:
+    methods = ("plugins.py:Toy", '{name: "plugins.py:Toy", label: "fails | a bit", params: {fail: "no <light>"}}')
+    config, output = write_config(tmp_path, methods), tmp_path / "out"
+    outcome, study = compute(config, output), load_study(config)
+    build_report(study, outcome.records, output, outcome.provenance)
+    shutil.rmtree(output / "records")
+    before = files(output)
+    assert "figures/answer-pictures.jpg" in before
+
+    frame = read_records((output / "records.csv").read_text())
+    assert difference(frame, plan(study)) == ""
+    records = committed_records(frame, plan(study))
+    for path in output.glob("figures/*.png"):
+        path.unlink()
+    build_report(study, records, output, outcome.provenance, keep_pictures=True)
+    after = files(output)
+    assert after.keys() == before.keys()
+    assert after["details.md"].decode() == before["details.md"].decode()
+    changed = [name for name in before if before[name] != after[name]]
+    assert changed == ["report.html"]  # which held the pictures of the records
+
+
+def test_other_cells_than_those_that_are_planned_are_counted(tmp_path: Path) -> None:
+    config = write_config(tmp_path, count=2)
+    outcome = compute(config, tmp_path / "out")
+    study = load_study(config)
+    build_report(study, outcome.records, tmp_path / "out", outcome.provenance)
+    frame = read_records((tmp_path / "out" / "records.csv").read_text())
+    config.write_text(config.read_text().replace("count: 2", "count: 1"))
+    counted = difference(frame, plan(load_study(config)))
+    assert counted.startswith("6 of 6 planned cells are not in")
+    assert "14 of 14 cells" in counted

@@ -1,7 +1,5 @@
 """records.csv, table.csv and tests.csv: complete without the config, and the same numbers as the report's."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path
@@ -134,9 +132,8 @@ def test_a_paired_test_has_the_numbers_of_the_report() -> None:
     tests = read(comparison_frame(found))
     assert len(tests) == 1
     row = tests.iloc[0]
-    assert row[["study", "display", "method", "label", "baseline", "metric"]].tolist() == [
-        *("toy", "leto-aged", "hil", "hil", "wirtinger, 200", "psnr_linear_db")
-    ]
+    names = row[["study", "display", "method", "label", "baseline", "metric"]].tolist()
+    assert names == ["toy", "leto-aged", "hil", "hil", "wirtinger, 200", "psnr_linear_db"]
     assert row[["n", "clusters", "better"]].tolist() == [8, 4, 6]
     numbers = row[["difference_db", "difference_lo_db", "difference_hi_db", "p_adjusted"]].astype(float).tolist()
     estimate = expected.estimate

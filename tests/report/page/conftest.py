@@ -1,7 +1,5 @@
 """A page of made-up captures, whose names try to be markup, formulas and separators."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A reader of a page: a browser's page with what went wrong in it and what it asked of the network."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +24,7 @@ class Reader:
         page.on("request", lambda request: self.asked.append(request.url))
         page.on("dialog", lambda dialog: self.wrong.append(dialog.message))
 
-    def open(self, rest: str = "") -> Reader:
+    def open(self, rest: str = "") -> "Reader":
         """Load the address with what comes after it."""
         self.page.goto("about:blank")
         self.asked.clear()
@@ -46,7 +44,7 @@ def reading(reader: Reader, rest: str = "") -> Iterator[None]:
 class ReportReader(Reader):
     """A reader of a report's page."""
 
-    def open(self, rest: str = "") -> ReportReader:
+    def open(self, rest: str = "") -> "ReportReader":
         super().open(rest)
         self.page.wait_for_function("() => document.getElementById('panes').getAttribute('aria-label')")
         return self

@@ -1,7 +1,5 @@
 """The page in a browser: what a reader does with pointer, keys and links, and that nothing is loaded or goes wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -175,9 +173,7 @@ def test_a_link_leads_to_the_same_view(reader: ReportReader) -> None:
     np.testing.assert_array_equal(reader.canvas(), before)
 
 
-def test_a_link_with_names_that_do_not_exist_shows_the_start_and_one_within_keeps_the_view(
-    reader: ReportReader,
-) -> None:
+def test_a_link_with_unknown_names_shows_the_start_and_one_within_keeps_the_view(reader: ReportReader) -> None:
     start = reader.methods()
     reader.open("#display=%3Cscript%3Ealert(1)%3C/script%3E&sort=none&target=nobody&split=x&right=capture:nobody")
     assert reader.methods() == start
@@ -215,9 +211,7 @@ def test_in_alternation_one_side_is_seen_at_a_time_with_its_caption(browser: Any
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 400), ("dark", 1400)])
-def test_axe_finds_nothing_serious_and_nothing_is_wider_than_the_window(
-    browser: Any, written: Written, scheme: str, width: int
-) -> None:
+def test_axe_finds_nothing_serious_and_nothing_is_wider_than_the_window(browser, written, scheme, width) -> None:
     seen = {"viewport": {"width": width, "height": 800}, "color_scheme": scheme, "reduced_motion": "reduce"}
     reader = reader_of(browser, written, **seen)
     with reading(reader, "#open=HIL&right=error%3AHIL"):

@@ -1,7 +1,5 @@
 """Rankings over draws of a display: made-up studies in which it is known what flips, and why."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from importlib.resources import files

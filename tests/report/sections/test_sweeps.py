@@ -1,7 +1,5 @@
 """What sweeps cost, from made-up scores whose answer is known."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A site over an own report and the folder of somebody else, whose names try to be markup, formulas and paths."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass
 from pathlib import Path

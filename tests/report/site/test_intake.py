@@ -1,7 +1,5 @@
 """What a folder of others has to be, and that whatever else is refused in one line that says what to do."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,8 +13,6 @@ from holobench_eval.core.errors import UserError
 from holobench_eval.report.site import intake, pictures, write_site
 from holobench_eval.report.site.intake import read
 from tests.support.results_folder import edited, write_results
-
-from .conftest import Site
 
 OWN = Path("reports")
 
@@ -195,9 +191,7 @@ def test_a_wrong_picture_is_refused(handed_in: Path, change: Callable[[Path], ob
     refused(handed_in, "thumbnails", *words)
 
 
-def test_a_picture_of_too_many_bytes_or_pixels_is_refused_before_it_is_decoded(
-    handed_in: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_picture_of_too_many_bytes_or_pixels_is_refused_before_it_is_decoded(handed_in: Path, monkeypatch) -> None:
     monkeypatch.setattr(Image.Image, "load", lambda self: pytest.fail("decoded"))
     monkeypatch.setattr(pictures, "MOST_PIXELS", 100)
     refused(handed_in, "32 x 24 pixels")
@@ -217,32 +211,19 @@ def test_a_thumbnail_of_others_is_written_anew_pixel_for_pixel(handed_in: Path) 
 
 
 @pytest.mark.parametrize(("limit", "words"), [("MOST_ROWS", "rows; expected"), ("MOST_LABELS", "labels; expected")])
-def test_a_folder_of_too_many_rows_or_labels_is_refused(
-    handed_in: Path, monkeypatch: pytest.MonkeyPatch, limit: str, words: str
-) -> None:
+def test_a_folder_of_too_many_rows_or_labels_is_refused(handed_in: Path, monkeypatch, limit: str, words: str) -> None:
     monkeypatch.setattr(intake, limit, 5)
     refused(handed_in, words, "at most 5")
 
 
-def test_a_linked_report_in_a_folder_of_reports_is_refused(tmp_path: Path, passing: Path) -> None:
-    (tmp_path / "all").mkdir()
-    (tmp_path / "all" / "linked").symlink_to(passing)
-    with pytest.raises(UserError, match="linked: a link"):
-        write_site([tmp_path / "all"], tmp_path / "site", OWN)
-
-
-def test_own_is_what_lies_below_the_folder_of_own_reports_and_names_nobody(
-    tmp_path: Path, study: list[dict[str, Any]]
-) -> None:
+def test_own_is_what_lies_below_the_folder_of_own_reports_and_names_nobody(tmp_path: Path, study) -> None:
     ours, kept = write_results(tmp_path / "a" / "b", study), write_results(tmp_path / "a" / "c", study, by="Lab")
     assert (read(ours, tmp_path / "a").by, read(kept, tmp_path / "a").by) == ("", "Lab")
     with pytest.raises(UserError, match='lacks "by"'):
         read(ours, tmp_path / "others")
 
 
-def test_a_folder_without_records_is_named_and_a_bad_one_among_good_ones_stops_the_site(
-    tmp_path: Path, study: list[dict[str, Any]]
-) -> None:
+def test_a_folder_without_records_is_named_and_a_bad_one_among_good_ones_stops_the_site(tmp_path, study) -> None:
     own, site = tmp_path / "all", tmp_path / "site"
     write_results(own / "good", study)
     (own / "timings").mkdir()
@@ -254,7 +235,11 @@ def test_a_folder_without_records_is_named_and_a_bad_one_among_good_ones_stops_t
         write_site([own], site, own)
 
 
-def test_an_output_that_is_no_site_or_overlaps_is_refused(site: Site, tmp_path: Path) -> None:
+def test_a_linked_report_and_an_output_that_is_no_site_or_overlaps_are_refused(site, tmp_path, passing) -> None:
+    (site.own.parent.parent / "all").mkdir()
+    (site.own.parent.parent / "all" / "linked").symlink_to(passing)
+    with pytest.raises(UserError, match="linked: a link"):
+        write_site([site.own.parent.parent / "all"], tmp_path / "site", OWN)
     (tmp_path / "kept.txt").write_text("mine")
     for output, word in ((tmp_path, "no file of"), (site.own / "site", "overlaps"), (site.own.parent, "no file of")):
         with pytest.raises(UserError, match=word):

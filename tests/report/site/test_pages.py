@@ -1,18 +1,21 @@
-"""The pages: links stay inside, names stay text, equal folders give equal bytes."""
-
-from __future__ import annotations
+"""The site: links stay inside, names stay text, files of others stay, and everybody can read it."""
 
 import json
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from holobench_eval.report.site import write_site
+from holobench_eval.core.errors import StorageError, UserError
+from holobench_eval.report.site import build, write_site
 from holobench_eval.report.site.html import slug
 from tests.report.elements import Elements
+from tests.report.page.reading import Reader, reading
+from tests.support.axe import serious
+from tests.support.reports import files
 from tests.support.results_folder import write_results
 
 from .conftest import HOSTILE, LAB, OTHER, PATH, THEIRS, Site
@@ -50,9 +53,7 @@ def test_there_is_a_page_for_every_method_display_and_study(site: Site) -> None:
     assert found == wanted | {"index.html"}
 
 
-def test_names_open_no_element_and_become_no_path_and_the_policy_lets_nothing_in(
-    site: Site, pages: dict[Path, Elements]
-) -> None:
+def test_names_open_no_element_and_become_no_path_and_the_policy_lets_nothing_in(site: Site, pages) -> None:
     for page in pages.values():
         assert not {"i", "u", "b", "img", "iframe", "script"} & {tag for tag, _ in page.found}
         assert page.opens_nothing()
@@ -66,9 +67,7 @@ def test_names_open_no_element_and_become_no_path_and_the_policy_lets_nothing_in
     assert all(path.resolve().is_relative_to(site.output) for path in site.output.rglob("*"))
 
 
-def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(
-    site: Site, tmp_path: Path, study: list[dict[str, Any]]
-) -> None:
+def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(site, tmp_path, study) -> None:
     moved = tmp_path / "elsewhere"
     shutil.copytree(site.own, moved / "reports" / "ours")
     shutil.copytree(site.other, moved / "others" / site.other.name)
@@ -94,9 +93,7 @@ def test_a_board_has_methods_in_groups_best_first_with_letters_and_differences(s
     assert "Study <a" in page
 
 
-def test_a_method_with_other_settings_is_a_row_of_its_own_and_one_without_any_score_says_so(
-    tmp_path: Path, study: list[dict[str, Any]]
-) -> None:
+def test_a_method_with_other_settings_or_without_any_score_is_a_row_of_its_own(tmp_path, study) -> None:
     """Rows are told apart by their labels: a budget of 12 captures is not a further run of one of 200."""
     hil = [record for record in study if record["label"] == "HIL"]
     more = [record | {"label": "HIL, 12", "cell": record["cell"] | {"captures": 12}} for record in hil]
@@ -109,9 +106,7 @@ def test_a_method_with_other_settings_is_a_row_of_its_own_and_one_without_any_sc
     assert "SGD, 0 of 4 targets</a></th>\n<td>–</td>" in page
 
 
-def test_only_studies_that_ask_for_it_enter_the_displays_and_the_question_of_each_is_text(
-    tmp_path: Path, study: list[dict[str, Any]]
-) -> None:
+def test_only_studies_that_ask_for_it_enter_the_displays_with_their_question_as_text(tmp_path, study) -> None:
     folder, site = write_results(tmp_path / "ours", study, known={"board": False}), tmp_path / "site"
     (folder / "board.json").write_text(json.dumps({"question": "Is it <b>better</b>?"}))
     write_site([folder], site, tmp_path)
@@ -129,3 +124,120 @@ def test_a_display_of_another_version_has_a_page_of_its_own(tmp_path: Path, stud
     write_site([write_results(tmp_path / "ours", study, known=known)], tmp_path / "site", tmp_path)
     page = (tmp_path / "site" / "displays" / f"{slug('ideal (22222222)')}.html").read_text()
     assert "Another display, or another version of one" in page
+
+
+OWN = Path("reports")
+
+
+@pytest.mark.parametrize(
+    ("is_site", "names"),
+    [
+        (False, ("assets/site.css", "assets/logo.svg", "pictures/holiday.jpg", "index.html")),
+        (True, ("CNAME",)),
+        (True, ("methods/mine.html",)),
+        (True, (".git/HEAD",)),
+    ],
+)
+def test_files_of_somebody_in_the_output_are_refused_and_kept(tmp_path, passing, is_site, names) -> None:
+    if is_site:
+        write_site([passing], tmp_path, OWN)
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("mine")
+    before = files(tmp_path)
+    with pytest.raises(UserError, match="which is no file of a site"):
+        write_site([passing], tmp_path, OWN)
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["methods", "index.html", "files-of-the-site.txt"])
+def test_nothing_is_written_through_a_link(tmp_path: Path, passing: Path, name: str) -> None:
+    site, outside = tmp_path / "site", tmp_path / "outside"
+    write_site([passing], site, OWN)
+    (site / name).rename(outside)
+    (site / name).symlink_to(outside)
+    before = files(outside) if outside.is_dir() else outside.read_bytes()
+    with pytest.raises(UserError, match="which is no file of a site"):
+        write_site([passing], site, OWN)
+    assert (files(outside) if outside.is_dir() else outside.read_bytes()) == before
+
+
+@pytest.mark.parametrize(("left", "earlier"), [(0, True), (1, False), (5, True)])
+def test_a_site_that_was_interrupted_is_written_by_the_same_command(tmp_path, passing, study, left, earlier) -> None:
+    expected, site = tmp_path / "expected", tmp_path / "site"
+    write_site([passing], expected, OWN)
+    if earlier:
+        write_site([write_results(tmp_path / "stale", study, by="Another lab")], site, OWN)
+
+    def full(path: Path, content: bytes) -> None:
+        nonlocal left
+        if not left:
+            (path.parent / ".writing-abc").write_bytes(b"half") if path.parent.is_dir() else None
+            raise StorageError("No space left")
+        left -= 1
+        write(path, content)
+
+    with pytest.MonkeyPatch.context() as patch:
+        write = build.write_atomically
+        patch.setattr(build, "write_atomically", full)
+        with pytest.raises(StorageError):
+            write_site([passing], site, OWN)
+    write_site([passing], site, OWN)
+    assert files(site) == files(expected)
+
+
+def test_two_files_of_one_name_are_refused_and_a_figure_and_a_thumbnail_are_two(tmp_path, handed_in: Path) -> None:
+    path = sorted((handed_in / "thumbnails").iterdir())[0]
+    (handed_in / "figures").mkdir()
+    for name in (path.name, "Quality-a.png", "quality-A.png"):
+        (handed_in / "figures" / name).write_bytes(path.read_bytes())
+    write_site([handed_in], tmp_path / "site", OWN)
+    pictures = tmp_path / "site" / "pictures" / "theirs"
+    assert len([each for each in pictures.iterdir() if each.is_file()]) == 3
+    assert len(list((pictures / "captures").iterdir())) == 2
+    path.with_suffix(".PNG").write_bytes(path.read_bytes())
+    with pytest.raises(UserError, match="two files of the site would have this name"):
+        write_site([handed_in], tmp_path / "another", OWN)
+
+
+def test_labs_whose_names_differ_by_case_or_space_alone_are_refused(tmp_path: Path, study) -> None:
+    folders = [write_results(tmp_path / name, study, by=name) for name in ("Our Lab", "our  lab")]
+    with pytest.raises(UserError, match="expected one name"):
+        write_site(folders, tmp_path / "site", OWN)
+
+
+@pytest.fixture
+def reader(browser: Any, site: Site) -> Iterator[Reader]:
+    found = Reader(browser.new_page(viewport={"width": 1000, "height": 800}), f"{site.output.as_uri()}/")
+    with reading(found, "index.html"):
+        yield found
+
+
+def test_opening_asks_for_the_files_of_the_site_alone(reader: Reader) -> None:
+    for name in ("index.html", "methods/hil.html", "displays/ideal.html", "studies/ours.html"):
+        reader.open(name)
+        assert len(reader.asked) >= 3
+        assert all(address.startswith(reader.address) for address in reader.asked)
+
+
+def test_the_policy_stops_what_would_leave_the_site(reader: Reader) -> None:
+    asked = reader.page.evaluate("() => fetch('https://example.org/').then(() => 'sent', () => 'refused')")
+    assert asked == "refused"
+    assert not [address for address in reader.asked if "example.org" in address]
+    assert all("example.org" in message for message in reader.wrong)  # the browser says that it was refused
+    reader.wrong.clear()
+
+
+@pytest.mark.parametrize(
+    ("scheme", "width", "names"),
+    [("light", 400, ("methods/gerchberg_saxton", "displays/leto-aged")), ("dark", 1400, ("studies/ours",))],
+)
+def test_axe_finds_nothing_serious_and_nothing_is_wider_than_the_window(browser, site, scheme, width, names) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
+    reader = Reader(page, f"{site.output.as_uri()}/")
+    for name in ("index", *names):
+        reader.open(f"{name}.html")
+        assert serious(page) == []
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    assert not reader.wrong
+    page.close()
