@@ -83,7 +83,7 @@ def _map(results: Results) -> Iterator[str]:
 
 def _judged(results: Results) -> Iterator[str]:
     """How well two scores of the models rank the methods that optimise through them."""
-    if parts := [f"{each.score} in {each.right} of {each.pairs}" for each in over.judged(results)]:
+    if parts := [f"{score} in {right} of {pairs}" for score, (right, pairs) in over.judged(results).items()]:
         yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
 
 

@@ -18,7 +18,6 @@ from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
 from .error_budget import budgets
 from .results import Results
-from .scores import Score
 from .statistics import FEWEST_DISPLAYS, Array, Estimate, two_way
 
 
@@ -155,16 +154,6 @@ class Map:
         return float(1 - missed / all_others) if all_others else 0.0
 
 
-@dataclass(frozen=True)
-class Judged:
-    """How often a score of models names the better of two methods that optimise through them. right: of ``pairs``, over
-    displays; score: its title."""
-
-    score: str
-    right: int
-    pairs: int
-
-
 def display_map(results: Results) -> Map | None:
     """The map from the first error budget among the related studies that has all displays; None without one."""
     where = shown_on(results)
@@ -193,21 +182,26 @@ def left_out(shares: Array, values: Array) -> Array:
     return values - (values - values @ hat) / (1 - np.diag(hat))
 
 
-def judged(results: Results) -> list[Judged]:
-    """What control and prediction of the models tell of their methods, from the related study that measured both."""
-    found = {each.label: each for each in margins(results)}
-    for other in results.related.values():
-        if other.layout.measure == "prediction" and other.control:
-            return [_judged(results, other, found, score) for score in (*other.control, other.headline)]
-    return []
+def judged(results: Results) -> dict[str, tuple[int, int]]:
+    """How often control and prediction of models name the better of two methods that optimise through them.
 
-
-def _judged(results: Results, other: Results, found: dict[str, Margin], score: Score) -> Judged:
-    right, pairs, key = 0, 0, score.key
-    for place, name in enumerate(shown_on(results)):
-        both = [label for label in other.methods(name) if label in found and other.is_complete(label, name, key)]
-        for first, second in itertools.combinations(both, 2):
-            margin = results.headline.sign * (found[first].values - found[second].values)[place]
-            model = other.values(first, name, key).mean() - other.values(second, name, key).mean()
-            right, pairs = right + bool(margin * model > 0), pairs + 1
-    return Judged(score.title, right, pairs)
+    From the related study that measured both: right ones and pairs over displays, by the title of the score.
+    """
+    found, told = {each.label: each for each in margins(results)}, dict[str, tuple[int, int]]()
+    models = (one for one in results.related.values() if one.layout.measure == "prediction" and one.control)
+    other = next(models, None)
+    if other is None:
+        return {}
+    for score in (*other.control, other.headline):
+        agree = []
+        for place, name in enumerate(shown_on(results)):
+            means = {
+                label: other.values(label, name, score.key).mean()
+                for label in other.methods(name)
+                if label in found and other.is_complete(label, name, score.key)
+            }
+            for first, second in itertools.combinations(means, 2):
+                margin = results.headline.sign * (found[first].values - found[second].values)[place]
+                agree.append(bool(margin * (means[first] - means[second]) > 0))
+        told[score.title] = sum(agree), len(agree)
+    return told
