@@ -30,7 +30,7 @@ from .model import TwinCamera, TwinModel
 QUANTILE = 2.35  # of Student's t, 90 % of which lie within: a spread over three colours
 FAINTEST = 0.01  # of what a fit leaves of a capture: a smaller change is not seen
 # Of the usual error of a quantity, what misfit left of 90 % of it on leto-2020, leto-aged, leto-dusty, plm-4bit and the
-# three displays of tests/support/outside.py, at 144 px; of quantities that are not named, a third or less.
+# three displays of tests/support/benches/outside.py, at 144 px; of quantities that are not named, a third or less.
 LEFT = {
     **{"lut_exponent": 1.5, "crosstalk": 1.5, "light": 1.6, "undiffracted_fraction": 0.6, "undiffracted_phase": 1.4},
     "stray_reach": 0.5,
