@@ -125,7 +125,8 @@ def test_signs_that_are_drawn_give_nearly_the_p_values_of_all_signs(monkeypatch)
 
 
 @pytest.mark.parametrize(
-    ("shape", "most", "clusters", "comparisons"), zip(SHAPES, (0.07, 0.1, 0.2), (15, 40, 15), (5, 2, 5), strict=False)
+    ("shape", "most", "clusters", "comparisons"),
+    list(zip(SHAPES, (0.07, 0.1, 0.2), (15, 40, 15), (5, 2, 5), strict=False)),
 )
 def test_a_false_difference_is_seldom_shown(shape, most, clusters, comparisons):
     """Comparisons are independent, which is the worst; ``docs/statistics.md`` has the shares of 2000 families."""
