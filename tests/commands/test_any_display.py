@@ -18,7 +18,7 @@ version: 1
 seed: 1
 description: A panel of any kind.
 like: ideal
-panel: {{wavelengths: [5.32e-7], shape: {shape}, distance: 0.009, pitch: 8.0e-6, bits: {bits}}}
+panel: {{wavelengths: [6.38e-7, 5.2e-7, 4.5e-7], shape: {shape}, distance: 0.009, pitch: 8.0e-6, bits: {bits}}}
 """
 STUDY = """\
 title: On any display
@@ -27,7 +27,7 @@ targets: {{dataset: charts, params: {{names: [tv_lines]}}}}
 methods: [double_phase]
 protocol: {{metrics: [psnr]}}
 """
-PANEL = [119, 131]  # of one laser and one bit; three lasers with eight bits are those of other tests
+PANEL = [119, 131]  # of three lasers and one bit; with eight bits they are those of other tests
 TAKEN = {"profile", "display", "config"}  # parameters by which a command is told a display
 APART = {"twin"}  # it learns for minutes: its models are tried on such displays in tests/methods/twin
 

@@ -70,10 +70,9 @@ def test_memory_that_is_used_up_is_one_line(monkeypatch, call, by):
 
 def test_a_plan_without_a_folder_of_trained_methods_says_where_a_clone_has_them(tmp_path, monkeypatch, call):
     def is_said(method: str) -> bool:
-        return (
-            "A clone of the repository has what the shipped studies need"
-            in call("plan", "table3", "--methods", method)[1]
-        )
+        code, printed, _ = call("plan", "table3", "--methods", method)
+        assert code == 0
+        return "A clone of the repository has what the shipped studies need in its folder artifacts" in printed
 
     monkeypatch.chdir(tmp_path)
     assert not is_said("hil")  # these tests run in one

@@ -61,10 +61,15 @@ class Table:
         (
             {"lenses": [{}, {"size": [1]}]},
             ("lenses", 1, "size", 1),
-            "table 'x' needs the parameter 'lenses",
+            "table 'x' needs the parameter 'lenses.1",
             "lenses[1]",
         ),
-        ({"lens": {"focus": 0}}, ("lens", "focus"), "table 'x': parameter 'lens.focus': input", "lens.focus sh"),
+        (
+            {"lens": {"focus": 0}},
+            ("lens", "focus"),
+            "table 'x': parameter 'lens.focus': input should be",
+            "lens.focus sh",
+        ),
     ],
 )
 def test_a_fault_is_one_line_with_its_place_in_the_words_of_its_owner(data, where, of_a_plug_in, of_a_file):

@@ -73,7 +73,6 @@ def test_another_or_an_altered_target_is_refused_and_not_confirmed_in_a_known_po
     others = half_replaced(target), shuffled(target), photograph("chelsea", SHAPE), 1 - target
     for other in others:
         assert confirmed(capture, other, plane(homography)) is None
-    for other in others[:3]:
         with pytest.raises(CellError, match="not found in the capture"):
             align(capture, other)
 

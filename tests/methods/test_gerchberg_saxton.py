@@ -20,7 +20,9 @@ from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import basis
 
 
-@pytest.mark.parametrize(("pupil", "start"), [(None, "random"), (0.6, "constant"), ("lens", "random")])
+@pytest.mark.parametrize(
+    ("pupil", "start"), [(None, "random"), (None, "constant"), (0.6, "random"), (0.6, "constant"), ("lens", "random")]
+)
 def test_the_error_never_rises(pupil, start, make_bench, lens, scene):
     bench = lens if pupil == "lens" else make_bench(pupil=pupil)
     target = scene(bench.spec.region.width, dtype=torch.float64)[:, 0]

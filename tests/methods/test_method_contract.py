@@ -172,6 +172,9 @@ def test_training_is_decided_by_the_seeds_alone(name: str) -> None:
     assert small.same(trained(replace(short(name), seed=1)), once) != drawn
 
 
+FAMILIES = ("parametric_model", "hil", "hil_plus", "twin")  # of each kind of training, one to its last photograph
+
+
 # The error budget's three are trained as the parametric model is; the end of a training is that of all.
 @pytest.mark.parametrize("name", [name for name in PREDICTING if name not in NESTED])
 def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
@@ -180,7 +183,7 @@ def test_a_method_killed_in_training_learns_the_same_bits(name: str) -> None:
     whole, moments = method.prepare(bench), memory.fate.passed
     kinds = ("after a photograph", "after keeping approximator")
     photographs, kept = ([at for at, moment in enumerate(moments) if moment == kind] for kind in kinds)
-    for at in (photographs[1], kept[0], *photographs[-1:] * (name == "parametric_model")):
+    for at in (photographs[1], kept[0], *photographs[-1:] * (name in FAMILIES)):
         memory = small.Memory(as_files=True)
         torch.manual_seed(at)
         with pytest.raises(small.Killed):

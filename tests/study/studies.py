@@ -58,18 +58,19 @@ def exchanged(text: str, *changes: tuple[str, str]) -> str:
 
 
 @contextmanager
-def one_line(*words: str) -> Iterator[None]:
-    """What comes is refused in one line that holds the words."""
+def one_line(*words: str, at: str = "") -> Iterator[None]:
+    """What comes is refused in one line that begins with a place and holds the words."""
     with pytest.raises((UserError, CellError)) as refused:
         yield
     line = str(refused.value)
+    assert line.startswith(at), line
     assert [word for word in words if word not in line] == [], line
     assert "\n" not in line
 
 
 def assert_refused(config: Path, message: str) -> None:
     """A config is refused in one line that begins with its place, as the message does, and the reason."""
-    with one_line(f"{config}:{message}"):
+    with one_line(at=f"{config}:{message}"):
         load_study(config)
 
 

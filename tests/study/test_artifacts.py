@@ -161,7 +161,7 @@ def test_a_damaged_or_hostile_artifact_is_refused_in_one_line(tmp_path, needed, 
     assert artifacts.load(needed).state["gain"].tolist() == [1, 1, 1]
     place = artifacts.folder_of(needed)
     damage(place)
-    with one_line(str(place), words):
+    with one_line(words, at=str(place)):
         artifacts.load(needed)
     assert not (place / "entered").exists()
 

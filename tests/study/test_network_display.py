@@ -84,8 +84,14 @@ CONFIGS = {
 def test_a_study_that_it_cannot_be_in_is_refused(folder, entries, fault):
     given = {"display": "{profiles: [net.yaml]}", "methods": "[double_phase]"} | entries
     config = write_study(folder / "study.yaml", **given)
-    with one_line(f"{config}:", fault):
+    with one_line(fault, at=f"{config}:"):
         load_study(config)
+
+
+def test_a_file_that_is_not_there_is_told_when_the_profile_is_read(folder):
+    (folder / "net.pt").unlink()
+    with pytest.raises(UserError, match=r"^net\.yaml:\d+:\d+: .*cannot be read: No such file or directory$"):
+        load_profile("net.yaml")
 
 
 def cut(folder: Path) -> None:

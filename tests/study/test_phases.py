@@ -72,6 +72,12 @@ def test_displays_of_the_same_optics_and_studies_beside_share_phases_and_new_rep
     assert len(found) == 6  # a folder that lies elsewhere shares nothing
 
 
+def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(tmp_path):
+    add_other_profile(tmp_path)
+    config = write_config(tmp_path, ("plugins.py:Seeing",), count=1, profiles="ideal, other.yaml")
+    assert [compute(config, tmp_path / RESULTS / name).solved for name in "ab"] == [2, 0]
+
+
 def test_only_studies_of_a_folder_of_results_share_their_phases():
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
     assert first == second == Phases(Path("here", RESULTS, "solved").absolute())

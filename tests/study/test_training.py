@@ -186,10 +186,14 @@ def test_a_follower_tells_the_newest_line_of_every_training_and_none_twice(tmp_p
         ("two", {"round": 3}, "round 3"),
         ("one", {"round": 0, "step": 10, "fidelity": 20.5}, "round 0, step 10, fidelity 20.5"),
         ("two", {"round": 3, "step": 0, "share": 0.0, "seconds": 40.0}, "0% of the steps; round 3, step 0, seconds 40"),
-        ("two", {"round": 3, "step": 9, "share": 0.25, "seconds": 60.0}, "25% of the steps, at least 60 s left; round"),
+        (
+            "two",
+            {"round": 3, "step": 9, "share": 0.25, "seconds": 60.0},
+            "25% of the steps, at least 60 s left; round 3, step 9, seconds 60",
+        ),
     ):
         logs[name].log(row)
-        wait_until(lambda: any(each.startswith(f"{name}: {line}") for each in told))  # noqa: B023
+        wait_until(lambda: f"{name}: {line}" in told)  # noqa: B023
     time.sleep(0.05)
     assert len(told) == 5
     for name, is_last in (("one", False), ("two", True)):

@@ -128,6 +128,10 @@ def counts(path: Path) -> np.ndarray:
     return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
 
 
+def in_bytes(path: Path) -> None:
+    save(path, (counts(path) >> 8).astype(np.uint8))
+
+
 def outside(path: Path) -> None:
     shutil.move(path, path.parents[3] / "secret.png")
     path.symlink_to(path.parents[3] / "secret.png")
@@ -139,7 +143,7 @@ def outside(path: Path) -> None:
         ("hologram", Path.unlink, "missing: captures/round-1/{}"),
         ("hologram", lambda path: save(path, counts(path)[:-2]), "wrong size: captures/round-1/{}"),
         ("hologram", lambda path: save(path, counts(path) | 0xFFFF), "of captures/round-1/{} is at 65535 counts"),
-        ("hologram", lambda path: save(path, (counts(path) >> 8).astype(np.uint8)), "another kind of file: captures/"),
+        ("hologram", in_bytes, "another kind of file: captures/round-1/{}"),
         ("hologram", outside, "leads out of the session folder"),
         ("dark", lambda path: save(path, counts(captures(path.parents[2], "hologram")[3]) + 1), "{} should be dark"),
     ],
@@ -184,6 +188,15 @@ def test_bits_at_the_upper_end_are_told_and_dark_frames_without_any_count_are_da
     assert "12 bits at the upper end of 16" in (photographed / "report" / "report.md").read_text()
 
 
+def test_jpeg_is_flagged_as_not_linear(photographed):
+    for path in (photographed / "captures" / "round-1").glob("*.png"):
+        light = counts(path) / 65535
+        encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        cv2.imwrite(str(path.with_suffix(".jpg")), (encoded * 255).round().astype(np.uint8), [1, 100])
+        path.unlink()
+    assert "not linear in light" in run("session", "import", photographed, *own(photographed))
+
+
 def test_a_folder_in_use_is_not_exported_into(exported):
     folder, _ = exported
     assert "not empty" in ended("session", "export", folder / "study.yaml", folder / "bench")[1]
@@ -195,7 +208,7 @@ def test_a_folder_in_use_is_not_exported_into(exported):
         (("methods:", "sweeps: [{condition: defocus, values: [1.0]}]\nmethods:"), "changes of a display"),
         (("methods:\n  - double_phase\n", "methods:\n  - oracle\n"), ""),
         (("[leto-mild]", "[leto-mild, ideal]"), "choose one with --display"),
-        (("[leto-mild]", "[plm-4bit]"), "4 bits"),
+        (("[leto-mild]", "[plm-4bit]"), "4 bits; patterns are written with 8"),
     ],
 )
 def test_what_cannot_be_photographed_is_refused_or_left_out(tmp_path, change, said):

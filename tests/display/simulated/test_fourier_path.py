@@ -42,7 +42,8 @@ def nominal(spec, phase, channel):
     return spec.propagator(channel).forward(torch.polar(torch.ones_like(phase), phase))
 
 
-@pytest.mark.parametrize(("channel", "sampling"), [(0, 1), (1, 3), (2, 3)])
+@pytest.mark.parametrize("channel", [0, 1, 2])
+@pytest.mark.parametrize("sampling", [1, 3])
 def test_an_ideal_bench_shows_what_methods_are_told(channel, sampling):
     shown = bench(sampling=sampling)
     light = shown.intensity(smooth(), channel)[:: shown.image_samples, :: shown.image_samples]

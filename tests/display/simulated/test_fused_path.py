@@ -52,7 +52,9 @@ def same(one):
     assert relative(lit, seen.detach().abs().square()) < 2e-6
 
 
-@pytest.mark.parametrize(("samples", "finer", "blaze"), [(1, 1, PLAIN), (1, 2, BLAZED), (2, 1, BLAZED), (3, 2, PLAIN)])
+@pytest.mark.parametrize(
+    ("samples", "finer", "blaze"), [(1, 1, PLAIN), (1, 2, BLAZED), (2, 1, BLAZED), (3, 2, BLAZED), (3, 2, PLAIN)]
+)
 @pytest.mark.parametrize("dusty", [None, [], [3], [0, 20, 36], list(range(37))])
 def test_the_kernel_and_torch_show_the_same_light(samples, finer, dusty, blaze):
     same(path(samples, finer, dusty, blaze))

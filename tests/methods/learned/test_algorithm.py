@@ -78,9 +78,9 @@ def _saves_often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checkpoint, "STEPS_BETWEEN_SAVES", 3)
 
 
-@pytest.mark.parametrize(
-    ("refine_images", "used", "held_out"), [(None, None, 1), (1, 2, 2), (2, None, 1), (9, 2, 2), (9, None, 2)]
-)
+@pytest.mark.parametrize("refine_images", [None, 1, 2, 9])
+@pytest.mark.parametrize("used", [None, 2])
+@pytest.mark.parametrize("held_out", [1, 2])
 def test_captures_are_all_images_then_some_a_round_and_those_held_out(refine_images, used, held_out) -> None:
     memory = Memory()
     bench = training_bench(SPEC, memory, images=3, held_out=held_out)

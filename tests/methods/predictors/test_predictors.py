@@ -99,10 +99,8 @@ def test_a_veil_keeps_the_light_that_stays_in_the_picture() -> None:
 
 
 def test_the_numbers_are_those_of_a_display_and_cost_three_captures() -> None:
-    ideal = load_profile("ideal").scaled(PANEL)
-    green = replace(ideal.panel, wavelengths=(5.17e-7,))
-    display = open_bench(replace(ideal, panel=green, stray_light=StrayLight(0.5, 0.125)), PANEL, 0)
-    image = TrainingImage("any", torch.full((1, 104, 104), 0.5))
+    display = open_bench(replace(load_profile("ideal").scaled(PANEL), stray_light=StrayLight(0.5, 0.125)), PANEL, 0)
+    image = TrainingImage("any", torch.full((3, 104, 104), 0.5))
     bench = TrainingBench(display, "veil", [image], [image], Memory(), 3, 0)
     learned = WirtingerVeil().prepare(bench)
     assert bench.captures == 3

@@ -101,13 +101,13 @@ LEARNS = plugins.text("learns")
 LEAVES = "{dataset: dead_leaves, params: {count: 3}, held_out: 1, captures: 60}"
 
 
-def computed(folder: Path, isolation: str, *methods: str) -> list[Any]:
-    """The digits of a study of one laser."""
+def computed(folder: Path, isolation: str, *methods: str, profile: str = "green.yaml") -> list[Any]:
+    """The digits of a study, if not told otherwise of one laser."""
     folder.mkdir()
     write_green(folder, "leto-mild")
     for name in ("mine", "learns"):
         (folder / f"{name}.py").write_text(plugins.text(name))
-    display = "{profiles: [green.yaml], panel: [128, 160]}"
+    display = f"{{profiles: [{profile}], panel: [128, 160]}}"
     config = write_study(folder / "study.yaml", *methods, display=display, training=LEAVES, isolation=isolation)
     found = digits(compute(config, folder / "out").records)
     assert list((folder / "artifacts").iterdir())  # each has trained for itself
@@ -123,7 +123,10 @@ def test_what_ships_has_the_digits_that_it_has_inside(tmp_path):
 
 def test_what_a_method_computes_and_learns_apart_is_what_it_has_inside(tmp_path):
     mine = "{name: 'mine.py:Mine', captures: 3}", "{name: 'mine.py:Mine', label: short, captures: 1}"
-    apart, inside = (computed(tmp_path / where, where, "'learns.py:Learns'", *mine) for where in ("files", "none"))
+    apart, inside = (
+        computed(tmp_path / where, where, "'learns.py:Learns'", *mine, profile="leto-mild")
+        for where in ("files", "none")
+    )
     assert apart == inside
     found = {label: (state, captures) for label, state, _, captures in apart}
     assert (found["Learns"], found["Mine"], found["short"][1]) == (("done", 0), ("done", 2), 1)
