@@ -45,7 +45,13 @@ def intensity_l2(intensity: Tensor, target: Tensor) -> Tensor:
     size = _dot(target, target).clamp_min(TINY)
     error = torch.mul(given, scale[:, None, None]).sub_(target)
     factor = 2 * scale / size
-    return linear(lambda _: _dot(error, error) / size, lambda grad: error * (grad * factor)[:, None, None], intensity)
+    return linear(
+        lambda _: _dot(error, error) / size,
+        lambda grad, kept, slope: kept * (grad * slope)[:, None, None],
+        intensity,
+        error,
+        factor,
+    )
 
 
 def amplitude_l2(intensity: Tensor, target: Tensor) -> Tensor:

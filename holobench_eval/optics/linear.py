@@ -10,24 +10,27 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 
 Map = Callable[[Tensor], Tensor]
+Adjoint = Callable[..., Tensor]
 
 
-def linear(forward: Map, adjoint: Map, values: Tensor) -> Tensor:
+def linear(forward: Map, adjoint: Adjoint, values: Tensor, *known: Tensor) -> Tensor:
     """``forward`` of values, whose gradient is ``adjoint`` of that of the result; differentiable once.
 
     Other maps than linear ones have a derivative at the values, which ``adjoint`` then knows.
     """
-    result: Tensor = _Linear.apply(values, forward, adjoint)  # type: ignore[no-untyped-call]
+    result: Tensor = _Linear.apply(values, forward, adjoint, *known)  # type: ignore[no-untyped-call]
     return result
 
 
 class _Linear(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, values: Tensor, forward: Map, adjoint: Map) -> Tensor:
+    def forward(ctx: Any, values: Tensor, forward: Map, adjoint: Adjoint, *known: Tensor) -> Tensor:
         ctx.adjoint = adjoint
+        ctx.save_for_backward(*known)
         return forward(values)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None]:
-        return ctx.adjoint(grad), None, None
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        known = ctx.saved_tensors
+        return ctx.adjoint(grad, *known), None, None, *(None for _ in known)

@@ -30,8 +30,9 @@ def phasor(amplitude: Tensor, phase: Tensor) -> Tensor:
     """
     size, angle = amplitude.detach(), phase.detach()
     field = torch.complex(angle.cos().mul_(size), angle.sin().mul_(size))
-    kept = field.detach()  # the field itself will hold what holds this
-    return linear(lambda _: field, lambda grad: (grad.imag * kept.real).sub_(grad.real * kept.imag), phase)
+    return linear(
+        lambda _: field, lambda grad, kept: (grad.imag * kept.real).sub_(grad.real * kept.imag), phase, field.detach()
+    )
 
 
 def mean_phasor(phase: Tensor, dim: int) -> Tensor:
@@ -49,16 +50,20 @@ def mean_phasor(phase: Tensor, dim: int) -> Tensor:
     >>> mean_phasor(torch.tensor([0.0, torch.pi]), 0).abs() < 1e-6
     tensor(True)
     """
-    cosine, sine = phase.detach().cos(), phase.detach().sin()
+    cosine, sine, count = phase.detach().cos(), phase.detach().sin(), phase.shape[dim]
 
-    def back(grad: Tensor) -> Tensor:
-        real, imaginary = ((part / phase.shape[dim]).unsqueeze(dim) for part in (grad.real, grad.imag))
+    def back(grad: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
+        real, imaginary = ((part / count).unsqueeze(dim) for part in (grad.real, grad.imag))
         return (cosine * imaginary).sub_(sine * real)
 
-    return linear(lambda _: torch.complex(cosine.mean(dim), sine.mean(dim)), back, phase)
+    return linear(lambda _: torch.complex(cosine.mean(dim), sine.mean(dim)), back, phase, cosine, sine)
 
 
 def squared_modulus(field: Tensor) -> Tensor:
     """``|field|^2`` of a complex field; differentiable once."""
-    given = field.detach()
-    return linear(lambda _: given.real.square() + given.imag.square(), lambda grad: given * (2 * grad), field)
+    return linear(
+        lambda light: light.real.square() + light.imag.square(),
+        lambda grad, kept: kept * (2 * grad),
+        field,
+        field.detach(),
+    )

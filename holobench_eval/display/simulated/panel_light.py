@@ -59,8 +59,13 @@ class PanelLight:
         if not self.ready(phase.detach()):
             return self.in_torch(phase, gain)
         field = self.whole(phase.detach(), gain)
-        kept = field.detach()  # the field itself will hold what holds this
-        return linear(lambda _: field, lambda grad: self.back(grad, kept, phase, gain), phase)
+        return linear(
+            lambda _: field,
+            lambda grad, kept, shown: self.back(grad, kept, shown, gain),
+            phase,
+            field.detach(),
+            phase.detach(),
+        )
 
     def in_torch(self, phase: Tensor, gain: float) -> Tensor:
         """``field`` by torch: the reference for compiled code, in its place where it cannot be."""
