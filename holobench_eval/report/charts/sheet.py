@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import io
+import itertools
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import torch
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
+from numpy.typing import NDArray
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from ...core.errors import UserError
@@ -26,7 +34,7 @@ from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
 from ...study.opening import open_bench
-from .style import METADATA, save_small
+from .style import METADATA
 
 VERSION = 6  # of the drawing: sheets of another are drawn again
 DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures
@@ -34,6 +42,10 @@ COLOURS = ("tab:red", "tab:green", "tab:blue")
 BOUNDS = (590e-9, 490e-9)  # m, between these colours
 MARGINS = {"left": 0.045, "right": 0.955, "bottom": 0.045, "top": 0.92, "wspace": 0.66, "hspace": 0.38}
 RAMP = 0.11  # cycles a pixel of the test ramp of a bench without a blaze
+# A PNG of so many colours of each kind, and of a cube for captures, is small enough to look at in a browser.
+SHADES = {"gray": 44, "viridis": 52, "magma": 40, "twilight": 40}
+LINES = (*COLOURS, "tab:orange", "tab:cyan")
+CUBE = (0, 85, 170, 255)
 AT_IRIS = ("horizontal [cycles / px]", "vertical [cycles / px]")
 SMALLEST_SHARE = 0.001  # of the light, from which on a zero order is drawn
 STEPS = 60  # of the hologram of the chart: it shows what the bench does, not what the method can
@@ -75,11 +87,35 @@ def save_sheet(workbench: CalibratedBench, note: str, path: Path, source: str = 
     figure.suptitle(f"{bench.profile.name}, version {bench.profile.version}: {bench.profile.description}\n{note}")
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".png":
-        save_small(figure, path, DPI, source)
+        _save_small(figure, path, source)
     else:
         figure.savefig(path, metadata=METADATA[path.suffix])
     plt.close(figure)
     return path
+
+
+def _save_small(figure: Figure, path: Path, source: str) -> None:
+    """A PNG of few colours, with a note of what it is drawn from."""
+    drawn, known = io.BytesIO(), PngInfo()
+    figure.savefig(drawn, format="png", dpi=DPI)
+    if source:
+        known.add_text("Description", source)
+    few = _of_few_colours(np.asarray(Image.open(drawn).convert("RGB")))
+    few.save(path, optimize=True, dpi=(DPI, DPI), pnginfo=known)
+
+
+def _of_few_colours(pixels: NDArray[np.uint8]) -> Image.Image:
+    """Pixels ``(h, w, 3)``, each with the nearest of the colours that all sheets share."""
+    ramps = (matplotlib.colormaps[name](np.linspace(0, 1, count))[:, :3] for name, count in SHADES.items())
+    named = np.round(255 * np.concatenate([*ramps, [to_rgb(colour) for colour in LINES]]))
+    palette = np.concatenate([named, [*itertools.product(CUBE, repeat=3)]]).astype(np.uint8)
+    packed = pixels.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
+    colours, places = np.unique(packed, return_inverse=True)
+    levels = np.stack([colours >> 16, colours >> 8 & 255, colours & 255], axis=1)
+    nearest = np.asarray(KDTree(palette).query(levels)[1], dtype=np.uint8)
+    picture = Image.fromarray(nearest[places].reshape(packed.shape))  # gray, until it has a palette
+    picture.putpalette(palette.tobytes())
+    return picture
 
 
 def _index(bench: SimulatedBench) -> int:

@@ -23,7 +23,6 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from numpy.typing import NDArray
 from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from .look.medium import DPI, medium
 from .look.methods import Look
@@ -122,20 +121,17 @@ def save(figure: Figure, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     for suffix in medium().suffixes:
         if suffix == ".png":
-            save_small(figure, path.with_suffix(suffix))
+            _save_chart(figure, path.with_suffix(suffix))
         else:
             figure.savefig(path.with_suffix(suffix), dpi=DPI, metadata=METADATA[suffix])
 
 
-def save_small(figure: Figure, path: Path, dpi: int = DPI, source: str = "") -> None:
-    """A PNG of 256 colours, a third of the bytes: white stays white, colours are off by 9 of 255 where it was most, in
-    sheets of many colours by 34. source: what it is drawn from, kept in the file."""
-    drawn, known = io.BytesIO(), PngInfo()
-    figure.savefig(drawn, format="png", dpi=dpi)
-    if source:
-        known.add_text("Description", source)
+def _save_chart(figure: Figure, path: Path) -> None:
+    """A PNG of 256 colours, a third of the bytes: white stays white, colours are off by 9 of 255 where it was most."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=DPI)
     chart = Image.open(drawn).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    chart.save(path, dpi=(dpi, dpi), optimize=True, pnginfo=known)
+    chart.save(path, dpi=(DPI, DPI), optimize=True)
 
 
 def save_picture(pixels: NDArray[np.uint8], path: Path) -> None:
