@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -43,8 +44,10 @@ class Report:
         """(file, caption) of figures made of pictures: drawn, or those of ``pattern`` that an earlier report left."""
         if not self.keeps_pictures:
             return draw()
+        if self.drawn is not None:
+            return []
         known = ((self.figures / name, Markdown(text)) for name, text in captions(self.output).items())
-        return [(path, text) for path, text in known if path.match(pattern) and path.is_file()]
+        return [(path, text) for path, text in known if fnmatch(path.name, pattern) and path.is_file()]
 
     @property
     def layout(self) -> Layout:

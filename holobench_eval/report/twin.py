@@ -164,7 +164,8 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
             heading(f"{found.name}: {'the twin of' if less else 'a network in the place of'} {found.of}", 1),
             bullets(answer(found)),
             Markdown("![A picture on the display and on its twin]({})").format(Markdown(PICTURES)),
-            "The first picture, matched to its target; differences in linear light, without their sign.",
+            "The first picture, matched to its target; of a large one its most detailed part. Differences to the "
+            "photograph in linear light, without their sign.",
             heading("The same holograms on both"),
             _methods(found),
             f"PSNR in linear light, means over {len(found.pictures)} pictures that the twin did not learn from, with "

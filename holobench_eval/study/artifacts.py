@@ -97,9 +97,13 @@ class Artifacts:
         """The artifact, once for a process. UserError: damaged, foreign, or made for something else."""
         folder = self.folder_of(preparation)
         states = file_state(folder / STATE), file_state(folder / LOG)
-        if states[0] is None or not (folder / PROVENANCE).is_file():
+        try:
+            described = (folder / PROVENANCE).read_bytes() if states[0] else None
+        except OSError:
+            described = None
+        if described is None:
             raise UserError(f"{folder}: {STATE} or {PROVENANCE} is missing; {AGAIN}")
-        artifact = _loaded(folder, states, (folder / PROVENANCE).read_bytes())
+        artifact = _loaded(folder, states, described)
         trained, wanted = artifact.provenance["description"], preparation.description()
         for key in wanted:
             if trained.get(key) != wanted[key]:

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from ...display.api import DisplaySpec
-from ...display.nominal import propagated
 from ..common import matched, unit_field
 from ..learned.retrieval import Image, Verdict
 from ..learned.samples import Approximator, Sample
@@ -89,8 +88,12 @@ class NetworkApproximator(Approximator):
         return (self.ideal_gain.view(-1, 1, 1) * self._intensity(phase, light))[None]
 
     def _intensity(self, phase: Tensor, light: Tensor) -> Tensor:
-        field = self.spec.region.crop(propagated(unit_field(phase), self.spec))
-        return (field.real.square() + field.imag.square()) / light[:, None, None]
+        channels = []
+        for channel, panel in enumerate(phase):  # one at a time, for the memory
+            model = self.spec.propagator(channel, device=panel.device)
+            field = self.spec.region.crop(model.forward(unit_field(panel)))
+            channels.append((field.real.square() + field.imag.square()) / light[channel])
+        return torch.stack(channels)
 
     def _encoded(self, intensity: Tensor) -> Tensor:
         return intensity.clamp_min(1e-12).sqrt() if self.of_amplitude else intensity

@@ -16,7 +16,6 @@ from torch import Tensor
 
 from ...display.api import DisplaySpec
 from ...display.metered import MeteredDisplay
-from ...display.nominal import propagated
 from ...metrics.base import gaussian_blur
 from ..common import matched, unit_field
 from ..descent import cosine_decay
@@ -72,7 +71,10 @@ class OnlineCamera(OnlineLoop):
         if self.smoothing:
             error = gaussian_blur(error[None], self.smoothing)[0]
         slope = error * image.clamp_min(0).sqrt()
-        at_panel = unit_field(phase)
-        direction = torch.sgn(spec.region.crop(propagated(at_panel, spec)))
-        returned = propagated(spec.region.embed(slope * direction, spec.shape), spec, back=True)
-        return (at_panel.conj() * returned).imag
+        gradients = []
+        for colour, panel in enumerate(phase):  # one at a time, for the memory
+            model, at_panel = spec.propagator(colour, device=panel.device), unit_field(panel)
+            direction = torch.sgn(spec.region.crop(model.forward(at_panel)))
+            returned = model.adjoint(spec.region.embed(slope[colour] * direction, model.shape))
+            gradients.append((at_panel.conj() * returned).imag)
+        return torch.stack(gradients)

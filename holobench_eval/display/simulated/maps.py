@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
+import warnings
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -156,9 +157,9 @@ def described(path: Path, most: int, size: int, sha256: str | None) -> bytes:
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) != size:
-        raise UserError(f"{path.name} has {len(content)} bytes, and the profile says {size}: another file, or damaged")
+        raise UserError(f"{path} has {len(content)} bytes, and the profile says {size}: another file, or damaged")
     if hashlib.sha256(content).hexdigest() != (sha256 or "").lower():
-        raise UserError(f"{path.name} has another SHA-256 than the profile says: another file, or damaged")
+        raise UserError(f"{path} has another SHA-256 than the profile says: another file, or damaged")
     return content
 
 
@@ -196,9 +197,15 @@ def _content(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
 def _array(content: bytes, key: str, name: str) -> Tensor:
     """An array. NumPy's reader would believe what its header promises."""
     file = io.BytesIO(content)
-    if read_magic(file) != (1, 0):
-        raise ValueError(f"'{key}' has no header of an array")
-    shape, columns_first, kind = read_array_header_1_0(file, max_header_size=HEADERS)
+    try:
+        with warnings.catch_warnings(action="error"):
+            if read_magic(file) != (1, 0):
+                raise ValueError("another version")
+            shape, columns_first, kind = read_array_header_1_0(file, max_header_size=HEADERS)
+            if min(shape, default=0) < 0:
+                raise ValueError("a negative side")
+    except Exception as error:  # whatever NumPy says of it, with advice that is of no use here
+        raise ValueError(f"'{key}' has no header of an array") from error
     if kind != "<f4":
         raise UserError(f"{name}: '{key}' is of the type {kind.str!r}; expected float32, '<f4'")
     if 4 * math.prod(shape) != len(content) - file.tell():

@@ -45,7 +45,7 @@ def _line(board: Board, row: Row, group: str, has_panel_time: bool) -> dict[str,
             sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
             against = f"{score.estimate(row.test.estimate, signed=True)}{sign}"
         line[f"against {layout.baseline}{score.brackets}"] = against
-    line |= {each.name: each.number(value) for each, value in zip(board.beside, row.beside, strict=True)}
+    line |= {each.title: each.number(value) for each, value in zip(board.beside, row.beside, strict=True)}
     costs = {"photographs": row.photographs} if layout.spends_captures else {}
     costs |= {"panel time [frames]": row.panel_time} if has_panel_time else {}
     costs |= {"seconds": row.seconds, "memory [MiB]": row.memory} if layout.measure != FILES else {}

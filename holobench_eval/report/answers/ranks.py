@@ -16,7 +16,7 @@ def verdicts(results: Results) -> Iterator[str]:
     """One a display: who is first, how alike the rankings are, and which methods change places most."""
     found = [each for each in ranks(results) if each.exists]
     if not found:
-        yield "No draw has two different methods with a score for every target, so there is no ranking to compare."
+        yield "Methods with all scores tie before any draw or in each of them, so there is no ranking to compare."
     for each in found:
         before = f"{each.swept.before}: " * (len(found) > 1)
         nominal = [label for label, rank in zip(each.methods, each.nominal_positions, strict=True) if rank == 1]

@@ -81,7 +81,7 @@ class Ranks:
 
     @property
     def exists(self) -> bool:
-        """Whether there is a ranking: two methods that differ, and a draw."""
+        """Whether there is a ranking: two methods that differ on the nominal display and in a draw."""
         return len(self.methods) > 1 and len(self.taus) > 0
 
     @cached_property

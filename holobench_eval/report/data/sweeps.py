@@ -102,7 +102,8 @@ class Sweep:
     def recovered(self, label: str, remedy: Sweep) -> dict[str, Estimate]:
         """Share of each loss that is got back under the same value of another kind, by value; of a loss that is small,
         or not clear, no share is told."""
-        shares, cures = {}, {value: name for value, name in remedy.swept.points if name in remedy.losses(label)}
+        losses = remedy.losses(label)
+        shares, cures = {}, {value: name for value, name in remedy.swept.points if name in losses}
         for value, condition in self.swept.points:
             lost = self.loss(label, condition)
             if value in cures and lost is not None and lost.mean > SMALL and not lost.low <= 0:

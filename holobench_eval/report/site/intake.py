@@ -11,6 +11,7 @@ import io
 import itertools
 import json
 import re
+import sys
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +38,7 @@ STATES = (DONE, "failed", "skipped", "unavailable", "missing")
 MEASURES = ("picture", "focus", "views", "prediction", "error_budget", FILES)
 EXPOSURES = ("equal", "matched", "")
 LOUDEST = 200.0  # dB, of any score that makes sense
-FINITE = 1e300  # the same of other scores
+FINITE = sys.float_info.max  # the same of other scores
 NAMES = ("display", "condition", "method", "label", "target", "cluster")
 CAPTURES = ("captures", "training_captures")
 COUNTS = (*CAPTURES, "solving_s", "training_s")
@@ -53,10 +54,11 @@ def folded(name: str) -> str:
 
 def names_wrong(raw: pd.DataFrame) -> Iterator[str]:
     """Names that a reader cannot see or tell apart, or too many. raw: every cell of records as text."""
-    for number, most, what in ((len(raw), MOST_ROWS, "rows"), (raw["label"].nunique(), MOST_LABELS, "labels")):
+    labels = raw["label"].nunique() if "label" in raw else 0
+    for number, most, what in ((len(raw), MOST_ROWS, "rows"), (labels, MOST_LABELS, "labels")):
         if number > most:
             yield f"{number} {what}; expected at most {most} in a study"
-    for name in NAMES:
+    for name in (each for each in NAMES if each in raw):
         seen: dict[str, str] = {}
         for text in sorted(raw[name].unique()):
             if len(text) > LONGEST:
@@ -114,7 +116,8 @@ def cells_wrong(raw: pd.DataFrame, frame: pd.DataFrame) -> Iterator[str]:
         low, high = _bounds(name)
         rows = frame[~frame[name].between(low, high) & (raw[name] != "")]  # what is text and no number is wrong, too
         if len(rows):
-            yield f"{_named(rows)} has {name} {rows[name].iloc[0]:g}; expected a number from {low:g} to {high:g}"
+            right = f"from {low:g} to {high:g}" if high < FINITE else "that is finite"
+            yield f"{_named(rows)} has {name} {rows[name].iloc[0]:g}; expected a number {right}"
     for side in ("panel_height_px", "panel_width_px"):
         if wrong := sorted(text for text in set(raw[side]) if text and not _SIDE.fullmatch(text)):
             yield f"{side} {wrong[0]!r}; expected a number of pixels from 1 to 99999"
@@ -211,8 +214,10 @@ def read(folder: Path, own: Path) -> Source:
     by = _whose(folder, known, own)
     if not folder.resolve().name.isprintable():
         raise UserError(f"{str(folder)!r}: its name has characters that cannot be seen; rename it")
+    for problem in names_wrong(raw):
+        raise UserError(f"{folder / RECORDS}: {problem}")
     frame = records_of(folder, records_text(folder / RECORDS))
-    of_records = itertools.chain(names_wrong(raw), columns_wrong(frame), cells_wrong(raw, frame))
+    of_records = itertools.chain(columns_wrong(frame), cells_wrong(raw, frame))
     for path, problems in ((RECORDS, of_records), (provenance.FILE, facts_wrong(known, frame, strict=bool(by)))):
         for problem in problems:
             raise UserError(f"{folder / path}: {problem}")

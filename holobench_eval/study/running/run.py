@@ -126,9 +126,9 @@ def run(
         solved = _compute(plan, left, setting, executor, watch, drawings) if left.wanted else 0
         if described.get("ended") is None:
             described = provenance.end(output, described)
-        again = filter(None, map(store.read, left.unscored))
+        again = [record for record in map(store.read, left.unscored) if record and record.state == "done"]
         unscored = sum(bool(identity.lacking(record.scores, metrics)) for record in again)
-        rescored = len(left.unscored) - unscored
+        rescored = len(again) - unscored
         return Outcome(store.load(plan), described, len(left.missing), solved, rescored, unscored)
 
 
