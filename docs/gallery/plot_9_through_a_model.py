@@ -22,7 +22,7 @@ target = display.target(chelsea())
 phase = display.solve("wirtinger", target, iterations=60)
 pictures = {"wirtinger": display.capture(phase, target)}
 for profile in ("leto-mild", "leto-aged"):
-    phase = display.solve("through", target, profile=profile, iterations=30)
+    phase = display.solve("through", target, profile=profile, iterations=15)
     pictures[f"through {profile}"] = display.capture(phase, target)
 
 figure, axes = plt.subplots(1, 3, figsize=(9, 3), layout="constrained")
