@@ -35,7 +35,7 @@ def solve(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="A parameter: training.rounds=1 of each method, wirtinger.iterations=50 of that one.",
+            help="A parameter: training.rounds=1 of each method, wirtinger.iterations=50 of that label.",
         ),
     ] = None,
     artifacts: Learned = ARTIFACTS,
@@ -145,17 +145,19 @@ def _copy(picture: Path, folder: Path) -> None:
 def _entries(names: list[str], values: list[str]) -> list[Any]:
     """The methods of a config, with parameters that are ``key=value``: of the method that the key begins with, or of
     each. UserError for a text that is no such value."""
-    from ..core.yaml_source import parse
+    from ..core.yaml_source import Document
+    from ..study import isolation
     from ..study.changes import with_value
 
-    params = {name: parse("", "{}") for name in names}
+    def is_parameter(word: str) -> bool:
+        told = (isolation.words(name, Path()).parameters for name in names)
+        return any(each.name.partition(".")[0] == word for parameters in told for each in parameters)
+
+    document = Document("", "", {"methods": [{"name": name, "params": {}} for name in names]}, {}, {})
     for text in values:
-        for name in [name for name in names if text.startswith(f"{name}.")] or names:
-            params[name] = with_value(params[name], text.removeprefix(f"{name}."))
-    return [
-        {"name": _absolute(name), "params": params[name].data} if params[name].data else _absolute(name)
-        for name in names
-    ]
+        document = with_value(document, text, is_parameter, of_each=True)
+    entries = [{**entry, "name": _absolute(entry["name"])} for entry in document.data["methods"]]
+    return [entry if entry["params"] else entry["name"] for entry in entries]
 
 
 def _study(methods: list[Any], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:
