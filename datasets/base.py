@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from ..core.errors import UserError, suggest
+from ..core.errors import UserError, reason, suggest
 from ..optics import srgb_decode
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear R, G, B in relative luminance (ITU-R BT.709-6, section 3.2)
+
+SHOWN = ((256, 256), (144, 256), (256, 144))  # square, wide and tall: an image is cropped to the aspect of its display
 
 
 class Dataset(Protocol):
@@ -69,7 +71,7 @@ class Dataset(Protocol):
         """
 
     def digest(self, item: str) -> str:
-        """Tell one version of an image from another.
+        """Tell one version of an image from another; a dataset without it is told by pixels, see ``digest_of``.
 
         Parameters
         ----------
@@ -220,6 +222,19 @@ def named_digest(*names: object) -> str:
         SHA-256, hexadecimal.
     """
     return hashlib.sha256("\x1f".join(str(name) for name in names).encode()).hexdigest()
+
+
+def digest_of(dataset: Any, item: str) -> str:
+    """SHA-256 of an image: what its dataset says, or of its pixels in the aspects of ``SHOWN``. UserError: it fails."""
+    try:
+        if hasattr(dataset, "digest"):
+            return str(dataset.digest(item))
+        images = [dataset.load(item, shape, channels=3).float().cpu().numpy() for shape in SHOWN]
+        return hashlib.sha256(b"".join(str(image.shape).encode() + image.tobytes() for image in images)).hexdigest()
+    except UserError:
+        raise
+    except Exception as error:  # of a stranger's dataset
+        raise UserError(f"dataset '{type(dataset).__name__}', image '{item}': {reason(error)}") from error
 
 
 def clusters_of(dataset: Any) -> dict[str, str]:

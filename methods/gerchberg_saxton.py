@@ -31,15 +31,15 @@ class GerchbergSaxton(ByColour):
     iterations : int
         One forward and one adjoint propagation each.
     initial_phase : str
-        Where it starts. random: uniform over 2 pi; narrow: uniform over 1 rad; constant: zero; quadratic: the
-        lens that gathers the light of the panel in the region; dpe: the double phase hologram.
+        Where it starts. constant: zero; random: uniform over 2 pi, whose speckle stays; narrow: uniform over 1 rad;
+        quadratic: the lens that gathers the light of the panel in the region; dpe: the double phase hologram.
     offset : {"none", "centre"}
         Constant phase that is added in the end. none: zero; centre: the one that brings the phase of the fewest pixels
         to the wrap between 0 and 2 pi, whose edges a panel blurs.
     """
 
     iterations: Annotated[int, Interval(ge=1, le=100_000)] = 100
-    initial_phase: InitialPhase = "random"
+    initial_phase: InitialPhase = "constant"
     offset: Offset = "centre"
 
     title: ClassVar[str] = "Gerchberg-Saxton"

@@ -236,6 +236,10 @@ def test_counts_of_a_camera_are_linear_light_whatever_their_type(target):
         (lambda d, t: d.ideal(np.full((3, 128, 128), np.inf)), "a phase holds 49152 values that are NaN or infinite"),
         (lambda d, t: hb.open_display("ideal", panel=(256.0, 256)), r"rows and columns such as .*; got \(256.0, 256\)"),
         (lambda d, t: hb.open_display("ideal", panel=(3, 128)), "a panel has 64 to 8192 pixels a side"),
+        (
+            lambda d, t: hb.open_display("ideal", panel=(1081, 128)),
+            r"has 1080 x 1920 pixels, not \[1081, 128\]; give at",
+        ),
         (lambda d, t: hb.open_display(3), "name: expected that of a display profile, or its path; got int"),
         (lambda d, t: hb.open_display("ideal", panel=(128, 128), seed="x"), "seed: expected a whole number; got str"),
         (lambda d, t: hb.open_display("ideal", device="gpu"), "unknown device 'gpu'; auto, cpu, cuda or cuda:N"),

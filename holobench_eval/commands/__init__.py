@@ -134,6 +134,9 @@ def main() -> None:
         print(f"holoeval: {one_line(_told(error))}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, RuntimeError) as error:
+        if (looped := str(error).partition("Symlink loop from ")[2]).startswith("'"):  # as pathlib says it
+            print(f"holoeval: {one_line(looped)}: a link that leads back to itself; expected a file", file=sys.stderr)
+            sys.exit(2)
         if not out_of_memory(error):
             raise
         print("holoeval: out of memory; what is finished is kept, run the same command with more", file=sys.stderr)

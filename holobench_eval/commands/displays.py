@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import UserError
+from ..core.stand_ins import only_words
 from .output import console
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ def displays(
     folder: Annotated[list[Path] | None, typer.Option(metavar="DIR", help="Profiles in a folder, too.")] = None,
 ) -> None:
     """List the displays that a config may name: those that ship, of installed packages, and of given folders."""
+    if not folder:  # whose profiles may have maps
+        only_words()
     rows = [HEADINGS, *lines(sources(folder or ()))]
     *widths, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
     screen = console()

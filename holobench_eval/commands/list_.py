@@ -18,6 +18,7 @@ from rich.table import Table
 
 from ..core.errors import UserError, suggest
 from ..core.installed import shipped_configs
+from ..core.stand_ins import only_words
 from .displays import sources
 from .output import console
 
@@ -41,6 +42,7 @@ def list_(
     """List what a config may name; of one method, dataset or other name, its parameters and its paper."""
     screen = console()
     if name is None or name in KINDS:
+        only_words()
         for kind in [name] if name else KINDS:
             table = Table(title=kind, title_justify="left", show_header=False)
             for entry, text in KINDS[kind][0]():
@@ -77,7 +79,7 @@ def _words(file: Path) -> dict[str, str]:
     """What a config says in words."""
     import yaml
 
-    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    content = yaml.load(file.read_bytes(), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     return {key: " ".join(content[key].split()) for key in ("title", "question", "would_change") if key in content}
 
 
@@ -102,9 +104,12 @@ def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
 def _declared(kind: plugins.Kind, name: str) -> type[Any]:
     """The class of a plug-in, or what stands for a method of another package, whose code is not imported here."""
     from ..core import plugins
+
+    if kind != "methods" or plugins.is_shipped(kind, name):
+        return plugins.find(kind, name)
     from ..study import isolation
 
-    return isolation.find(name, Path()) if kind == "methods" else plugins.find(kind, name)
+    return isolation.find(name, Path())
 
 
 def profiles() -> Entries:
@@ -209,7 +214,7 @@ def explain_profile(screen: Console, name: str) -> None:
         table.add_row(effect.name, escape(effect.text))
     screen.print(table)
     try:
-        refuse_far(profile.spec((256, 256)), profile.panel.distance)
+        refuse_far(profile.spec(profile.usual), profile.panel.distance)
     except UserError as error:
         screen.print(escape(str(error)))
     else:

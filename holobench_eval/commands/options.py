@@ -48,7 +48,7 @@ RETRAIN = typer.Option("--retrain", help="Train again what the study's methods l
 Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Only the first N targets.")]
 Values = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Another value in the config: display.panel=[192, 192]."),
+    typer.Option("--set", metavar="KEY=VALUE", help="A value in the config, seed=7, or of a method, LABEL.step=0.1."),
 ]
 Profile = Annotated[str, typer.Argument(help="A display profile: its name or its file.")]
 

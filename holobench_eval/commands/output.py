@@ -63,7 +63,8 @@ def write_report(
     if text := uncovered(records):
         console.print(text, markup=False, soft_wrap=True)
     files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
-    console.print("\n".join(map(str, files)), soft_wrap=True)
+    if not output.name.startswith("."):  # of a command that leaves some of them elsewhere
+        console.print("\n".join(map(str, files)), soft_wrap=True)
     return results
 
 

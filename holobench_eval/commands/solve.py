@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 import shutil
+from collections.abc import Iterable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,16 +15,18 @@ import typer
 import yaml
 
 from ..core.errors import UserError
+from ..core.io import file_name
 from .options import ARTIFACTS, PANEL, RESULTS, RETRAIN, Learned
 
-STUDY = "study.yaml"  # in the output folder
+STUDY, ARCHIVE = "study.yaml", "study.zip"  # in the output folder; the archive has all that the study wrote
+MOST = 10  # files that are left for a picture: phases and captures of more methods are in the archive alone
 
 
 def solve(
     methods: Annotated[str, typer.Argument(help="A method, or several with commas between: names, or mine.py:solve.")],
     picture: Annotated[Path, typer.Argument(help="An 8-bit RGB or gray image.")],
     display: Annotated[str, typer.Option(help="A display profile: its name or its file.")] = "leto-2020",
-    panel: Annotated[tuple[int, int], PANEL] = (256, 256),
+    panel: Annotated[tuple[int, int] | None, PANEL] = None,
     output: Annotated[
         Path | None, typer.Option(help="Output folder. [default: holoeval-results/<name of the picture>]")
     ] = None,
@@ -31,30 +35,29 @@ def solve(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="A parameter: training.rounds=1 of each method, wirtinger.iterations=50 of that one.",
+            help="A parameter: training.rounds=1 of each method, wirtinger.iterations=50 of that label.",
         ),
     ] = None,
     artifacts: Learned = ARTIFACTS,
     retrain: Annotated[bool, RETRAIN] = False,
 ) -> None:
     """Let methods solve one picture: phases, captures, scores and a picture of all side by side."""
-    from ..core.io import file_name
     from ..datasets.images import decode, read
     from ..display import load_profile
     from ..study.config import load_study
     from ..study.plan import plan
-    from .run import run
+    from .run import INTERRUPTED, run
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if not picture.is_file() and Path(methods).is_file():
         raise UserError(f"{picture}: no such file; the picture comes second: holoeval solve METHODS {methods}")
     decode(read(picture), str(picture), gray=True)  # what is wrong with it is said of the file that was named
-    load_profile(display)
-    study_in = partial(_study, _entries(names, values or []), picture, display, panel)
+    size = panel or load_profile(display).usual
+    study_in = partial(_study, _entries(names, values or []), picture, display, size)
     # named like the picture, the first without a number
     numbered = (RESULTS / f"{picture.stem}{f'-{number}' * (number > 1)}" for number in itertools.count(1))
     folder = output or next(folder for folder in numbered if _is_free(folder, picture, study_in(folder)))
-    is_new, config = not folder.exists(), folder / STUDY
+    is_new, config, work = not folder.exists(), folder / STUDY, _work(folder)
     _copy(picture, folder)
     if not _is_free(folder, picture, study_in(folder)):
         raise UserError(f"{folder}: holds the report of other methods or of another display; choose another --output")
@@ -63,28 +66,55 @@ def solve(
         study = load_study(config)
         spec = plan(study).tasks[0].conditions[0].spec
         gray = " and shown in gray, by the one wavelength of the display" * (len(spec.wavelengths) == 1)
-        size = "{} x {} pixels".format(*spec.shape)
-        size += f", {1e3 * spec.distance:.4g} mm from its image" * (spec.plane == "fresnel")
+        optics = "{} x {} pixels".format(*spec.shape)
+        optics += f", {1e3 * spec.distance:.4g} mm from its image" * (spec.plane == "fresnel")
         print(
-            f"{picture} on {display}, a panel of {size}; the picture is cropped to the aspect of what is scored{gray}"
+            f"{picture} on {display}, a panel of {optics}; the picture is cropped to the aspect of what is scored{gray}"
         )
-        run(config, output=folder, executor="serial", artifacts=artifacts, retrain=retrain)
+        if (folder / ARCHIVE).is_file() and not work.exists():
+            with suppress(Exception):  # what is damaged is computed again
+                shutil.unpack_archive(folder / ARCHIVE, work)
+        run(config, output=work, executor="serial", artifacts=artifacts, retrain=retrain)
     except UserError as error:
-        if is_new and not (folder / "records").exists():
+        if is_new and not (work / "records").exists():
             shutil.rmtree(folder)
+            shutil.rmtree(work, ignore_errors=True)
         raise UserError(re.sub(rf"^{re.escape(str(config))}(:\d+)*: ", "", str(error))) from None
-    labels = [file_name(label) for label in study.labels]
-    for path in (
-        *sorted(folder.glob("figures/answer-pictures.jpg")),
-        *(folder / what / label for what in ("phases", "captures") for label in labels),
-    ):
-        print(path)
+    except typer.Exit as left:  # cells have failed, whose records stay in the folder of work
+        if left.exit_code != INTERRUPTED:
+            _leave(work, folder, study.labels)
+        raise
+    _leave(work, folder, study.labels)
+    shutil.make_archive(str((folder / ARCHIVE).with_suffix("")), "zip", work)
+    shutil.rmtree(work)
+    print(f"{folder / ARCHIVE}: all else, such as records, details and exact phases")
+
+
+def _work(folder: Path) -> Path:
+    """Where the study of an output folder is computed, until it is whole: beside it, so that all share phases."""
+    return folder.parent / f".{folder.name or 'solve'}"
+
+
+def _leave(work: Path, folder: Path, labels: Iterable[str]) -> None:
+    """Copy what a user wants of a study into the output folder, and print it."""
+    files = {name: work / name for name in ("report.html", "table.csv")}
+    files["pictures.jpg"] = work / "figures" / "answer-pictures.jpg"
+    for what in ("phases", "captures"):
+        found = {label: sorted((work / what / label).rglob("*.png")) for label in map(file_name, labels)}
+        if len(files) + sum(map(len, found.values())) <= MOST - 3:  # beside the config, the picture and the archive
+            for label, own in found.items():
+                files |= {f"{what}/{label}{f'-{n}' * (len(own) > 1)}.png": file for n, file in enumerate(own, 1)}
+    for name, file in files.items():
+        if file.is_file():
+            (folder / name).parent.mkdir(exist_ok=True)
+            shutil.copyfile(file, folder / name)
+            print(folder / name)
 
 
 def _is_free(folder: Path, picture: Path, study: str) -> bool:
     """Whether a folder holds no report, or that of this study of this picture."""
     config, copy = folder / STUDY, folder / "picture" / picture.name
-    if not (folder / "records").exists():
+    if not (folder / ARCHIVE).exists() and not _work(folder).exists():
         return True
     if not (config.is_file() and copy.is_file()):
         return False
@@ -115,17 +145,19 @@ def _copy(picture: Path, folder: Path) -> None:
 def _entries(names: list[str], values: list[str]) -> list[Any]:
     """The methods of a config, with parameters that are ``key=value``: of the method that the key begins with, or of
     each. UserError for a text that is no such value."""
-    from ..core.yaml_source import parse
+    from ..core.yaml_source import Document
+    from ..study import isolation
     from ..study.changes import with_value
 
-    params = {name: parse("", "{}") for name in names}
+    def is_parameter(word: str) -> bool:
+        told = (isolation.words(name, Path()).parameters for name in names)
+        return any(each.name.partition(".")[0] == word for parameters in told for each in parameters)
+
+    document = Document("", "", {"methods": [{"name": name, "params": {}} for name in names]}, {}, {})
     for text in values:
-        for name in [name for name in names if text.startswith(f"{name}.")] or names:
-            params[name] = with_value(params[name], text.removeprefix(f"{name}."))
-    return [
-        {"name": _absolute(name), "params": params[name].data} if params[name].data else _absolute(name)
-        for name in names
-    ]
+        document = with_value(document, text, is_parameter, of_each=True)
+    entries = [{**entry, "name": _absolute(entry["name"])} for entry in document.data["methods"]]
+    return [entry if entry["params"] else entry["name"] for entry in entries]
 
 
 def _study(methods: list[Any], picture: Path, display: str, panel: tuple[int, int], folder: Path) -> str:

@@ -8,6 +8,7 @@ package and is read from torchvision's published file.
 from __future__ import annotations
 
 import importlib.util
+import os
 import pickle
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -72,6 +73,12 @@ def _heads_file(network: Network) -> Path | None:
     return Path(spec.origin).parent / "functional" / "image" / "lpips_models" / f"{network}.pth"
 
 
+def _hub() -> Path:
+    """Torch's hub cache, by its rules, for a process without torch."""
+    home = os.environ.get("TORCH_HOME") or Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache", "torch")
+    return Path(home).expanduser() / "hub" / "checkpoints"
+
+
 def find_weights(network: Network, location: Path | None = None) -> Path | None:
     """The trunk's file: ``location`` or the newest match in it, or in torch's hub cache; None where there is none.
 
@@ -80,7 +87,7 @@ def find_weights(network: Network, location: Path | None = None) -> Path | None:
     """
     stem = _TRUNKS[network].stem
     if location is None:
-        folder = Path(torch.hub.get_dir()) / "checkpoints"
+        folder = _hub()
     elif location.is_file():
         if not location.name.startswith(tuple(trunk.stem for trunk in _TRUNKS.values())):
             raise UserError(f"LPIPS weights: {location} must be named alexnet*.pth or vgg16*.pth, as torchvision does")
@@ -98,7 +105,7 @@ def available(network: Network = "alex", location: Path | None = None) -> str | 
     if heads is None or not heads.is_file():
         return "the linear heads are missing; install torchmetrics"
     if find_weights(network, location) is None:
-        target = location or Path(torch.hub.get_dir()) / "checkpoints"
+        target = location or _hub()
         return f"no trunk weights; put {_TRUNKS[network].url} into {target}"
     return None
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import copy
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any
 
 from annotated_types import Interval
 
-from ..core.errors import UserError, suggest
+from ..core.errors import UserError, listed, suggest
 from ..core.schema import checked
 from ..core.yaml_source import Document, Keys, Position, parse
 
@@ -18,7 +18,7 @@ from ..core.yaml_source import Document, Keys, Position, parse
 @dataclass(frozen=True)
 class Changes:
     """methods, targets: labels (or names) and names to keep, none for all; limit: how many targets to keep, the first
-    ones; values: ``key=value``, with a dotted path as the key."""
+    ones; values: ``key=value``, with a dotted path as the key, or a method's label, a dot and its parameter."""
 
     methods: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
@@ -45,13 +45,13 @@ def noted(changes: Changes) -> dict[str, Any]:
     return {"changes": {key: value for key, value in asdict(changes).items() if value}} if changes else {}
 
 
-def changed(document: Document, changes: Changes) -> Document:
+def changed(document: Document, changes: Changes, keys: Container[str]) -> Document:
     """A config with the values of the changes; a fault in one is then told at its option.
 
-    UserError: a key that leads nowhere, or a value that is no YAML.
+    keys: those of a config. UserError: a key that leads nowhere, or a value that is no YAML.
     """
     for text in changes.values:
-        document = with_value(document, text)
+        document = with_value(document, text, keys.__contains__)
     return replace(document, text=f"# changed by {changes}\n{document.text}") if changes else document
 
 
@@ -67,12 +67,35 @@ def chosen(option: str, texts: Sequence[str], allowed: Sequence[str], what: str)
     return names
 
 
-def with_value(document: Document, text: str) -> Document:
-    """A document with the value of a text ``key=value``. UserError as `changed`."""
+def with_value(document: Document, text: str, known: Callable[[str], bool], of_each: bool = False) -> Document:
+    """A document with the value of a text ``key=value``. UserError as `changed`.
+
+    The key is a dotted path, or the label (else the name) of methods, a dot and their parameter. known: whether a word
+    may begin another key; of_each: whether such a key is a parameter of each method.
+    """
     key, equals, value = text.partition("=")
-    place = f"--set {text}"
+    place, first = f"--set {text}", key.partition(".")[0]
     if not equals or not all(key.split(".")):
         raise UserError(f"{place}: expected key=value, with dots between nested keys")
+    methods: list[dict[str, Any]] = []
+    if isinstance(given := document.data.get("methods"), list):
+        methods = [each if isinstance(each, dict) else {"name": each} for each in given]
+        document = replace(document, data={**document.data, "methods": methods})
+    names = [str(each.get("name")) for each in methods]
+    labels = [str(each.get("label") or name.rpartition(":")[2]) for each, name in zip(methods, names, strict=True)]
+    called = [] if not of_each and known(first) else [*labels, *names]
+    begun = max((name for name in called if key.startswith(f"{name}.")), key=len, default="")
+    if not begun and "." in key and not known(first):
+        raise UserError(f"{place}: no method '{first}' among {listed(labels)}, and no key of this name")
+    called = labels if begun in labels else names
+    rows = [row for row, name in enumerate(called) if name == begun or (of_each and not begun)]
+    for own in [f"methods.{row}.params.{key.removeprefix(f'{begun}.')}" for row in rows] or [key]:
+        document = _with(document, own, _value(value, place), place)
+    return document
+
+
+def _with(document: Document, key: str, value: Any, place: str) -> Document:
+    """A document with a value at a dotted path."""
     path: Keys = ()
     data = copy.deepcopy(document.data)
     inner: Any = data
@@ -83,7 +106,7 @@ def with_value(document: Document, text: str) -> Document:
             inner.setdefault(part, {})
         inner = inner[path[-1]]
     path = (*path, _key(inner, last, place, path))
-    inner[path[-1]] = _value(value, place)
+    inner[path[-1]] = value
     known = document.values
     new = [path[:depth] for depth in range(1, len(path) + 1) if path[:depth] not in known]
     replaced = [where for where in known if where[: len(path)] == path]

@@ -57,7 +57,7 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     ('double_phase', 'gerchberg_saxton', 'wirtinger', 'hil_plus')
     """
     document, changes = load(Path(path)), changes or Changes()
-    document = changed(replace(document, data=_long_form(document.data)), changes)
+    document = changed(replace(document, data=_long_form(document.data)), changes, Study.__dataclass_fields__)
     study = typed(document, Study, _long_form(document.data))
     study = _with_grids(replace(study, file=Path(path), text=document.text, changes=changes), document)
     study = _with_chosen_methods(study)
@@ -216,9 +216,10 @@ def _specs(study: Study, document: Document) -> dict[str, DisplaySpec]:
 def _smallest_panel(source: str, panel: tuple[int, int], folder: Path) -> tuple[int, int]:
     """The smallest panel, of at least these rows and columns, whose scored window is large enough for registration."""
     profile, side = load_profile(source, folder), SMALLEST_REGION
-    while min(profile.spec((max(panel[0], side), max(panel[1], side))).region.shape) < SMALLEST_REGION:
-        side += 1
-    return max(panel[0], side), max(panel[1], side)
+    most_rows, most_columns = profile.panel.shape
+    while min(profile.spec(panel).region.shape) < SMALLEST_REGION:
+        panel, side = (min(max(panel[0], side), most_rows), min(max(panel[1], side), most_columns)), side + 1
+    return panel
 
 
 def _entry(study: Study, document: Document, entry: MethodEntry, specs: Mapping[str, DisplaySpec]) -> MethodEntry:

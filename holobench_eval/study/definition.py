@@ -14,6 +14,7 @@ from annotated_types import Interval, MinLen
 
 from ..core import plugins
 from ..core.errors import UserError
+from ..datasets.base import digest_of
 from ..display.api import Exposure
 from .changes import Changes
 
@@ -307,7 +308,7 @@ class Study:
         """Name and digest of every image that methods may train on."""
         training = self.training
         dataset = plugins.build("datasets", training.dataset, dict(training.params), self.folder)
-        return tuple((item, dataset.digest(item)) for item in dataset.items())
+        return tuple((item, digest_of(dataset, item)) for item in dataset.items())
 
     @property
     def predicts(self) -> bool:

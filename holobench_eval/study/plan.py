@@ -11,6 +11,7 @@ from typing import Any
 
 from ..core.errors import UserError
 from ..core.hashing import digest
+from ..datasets.base import digest_of
 from ..display.api import Exposure
 from ..display.traits import traits_of
 from . import identity, isolation
@@ -182,7 +183,7 @@ def plan(study: Study) -> Plan:
     >>> len(grid.tasks), len(grid.cells)
     (40, 80)
     """
-    targets = [(item, study.dataset.digest(item)) for item in study.items]
+    targets = [(item, digest_of(study.dataset, item)) for item in study.items]
     displays_by_source = displays(study)
     ground = _Ground(study)
     apart = targets_a_scene(ground.stacks) if ground.stacks else 1

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.errors import UserError
+from ..datasets.base import digest_of
 from ..display import load_profile
 from ..display.simulated.changes.kinds import PLACES
 from ..display.traits import Traits, traits_of
@@ -47,7 +48,7 @@ def stacks_of(dataset: Any, name: str, measure: str) -> dict[str, tuple[str, flo
 
 def given_views(dataset: Any, item: str) -> list[View]:
     """The views of an item's scene that methods are given, that nearest to the axis first."""
-    views = [(view, str(dataset.digest(view)), float(dataset.place(view))) for view in dataset.views(item)]
+    views = [(view, digest_of(dataset, view), float(dataset.place(view))) for view in dataset.views(item)]
     return sorted(views, key=lambda view: abs(view[2]))
 
 

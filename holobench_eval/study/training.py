@@ -19,6 +19,7 @@ from ..core.errors import CellError, Pending, StopError, reason
 from ..core.installed import __version__
 from ..core.io import now, write_atomically
 from ..core.reads import Seen, recorded
+from ..datasets.base import digest_of
 from ..display.estimates import joined
 from ..display.learned import LearnedBench
 from ..display.simulated.ground_truth import truth
@@ -152,7 +153,7 @@ def _images(preparation: Preparation, device: torch.device) -> tuple[Any, list[T
     if dataset_version(given.dataset, type(dataset)) != preparation.images_version:
         raise CellError(f"the code of dataset '{given.dataset}' {AGAIN}")
     for item, sha256 in preparation.images:
-        if dataset.digest(item) != sha256:
+        if digest_of(dataset, item) != sha256:
             raise CellError(f"training image '{item}' {AGAIN}")
         target = dataset.load(item, spec.region.shape, channels=len(spec.wavelengths))
         images.append(TrainingImage(item, target.to(device)))

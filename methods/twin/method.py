@@ -27,7 +27,7 @@ from .drift import TwinApproximator
 from .errors import estimates, unseen
 from .model import TwinCamera, TwinModel
 
-OPEN_LOOP = (Wirtinger(), DoublePhase(), AmplitudeSGD(), GerchbergSaxton())
+OPEN_LOOP = (Wirtinger(), DoublePhase(), AmplitudeSGD(), GerchbergSaxton(initial_phase="random"))
 
 
 def learned_twin(learned: Mapping[str, Any], spec: DisplaySpec) -> tuple[TwinModel, TwinCamera]:

@@ -12,6 +12,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from holobench_eval import commands
 from holobench_eval.commands import main, options
@@ -129,6 +130,49 @@ def test_bad_input_is_one_line_and_exit_code_2(config, call, arguments, message)
     code, out, err = call(*arguments)
     assert (code, out, err[:10], err.count("\n"), "Errno" in err) == (2, "", "holoeval: ", 1, False)
     assert message in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("solve", "wirtinger", "my.png", "--display", "ideal", "--panel", 5000, 5000),
+        ("twin", "ideal", "-o", "lab", "--panel", 5000, 5000),
+        ("show", "ideal", "--panel", 5000, 5000),
+        ("run", "toy.yaml", "--set", "display.panel=[5000, 5000]"),
+        ("plan", "toy.yaml", "--set", "display.panel=[5000, 5000]"),
+    ],
+)
+def test_a_panel_that_the_display_does_not_have_is_one_line_and_leaves_nothing(config, call, arguments):
+    Image.new("RGB", (40, 30)).save("my.png")
+    before = {path for path in config.parent.rglob("*") if path.is_file()}
+    code, _, error = call(*arguments)
+    assert (code, error.count("\n")) == (2, 1)
+    assert error.endswith("the panel of 'ideal' has 1080 x 1920 pixels, not [5000, 5000]; give at most these\n")
+    assert {path for path in config.parent.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "file"),
+    [
+        (("run", "loop.yaml"), "loop.yaml"),
+        (("solve", "wirtinger", "loop.png"), "loop.png"),
+        (("solve", "wirtinger", "my.png", "--display", "loop.yaml"), "loop.yaml"),
+        (("solve", "wirtinger", "my.png", "--output", "loop"), "loop/picture"),
+        (("solve", "loop.py:f", "my.png"), "loop.py"),
+        (("plan", "toy.yaml", "--set", "methods=['loop.py:f']"), "loop.py"),
+        (("plan", "toy.yaml", "--set", "methods=[{name: phases, params: {file: loop.png}}]"), "loop.png"),
+        (("plan", "toy.yaml", "--set", "targets={dataset: folder, params: {path: loop}}"), "loop"),
+        (("plan", "toy.yaml", "--set", "targets={dataset: folder, params: {path: .}}"), "loop.png"),
+        (("list", "loop.yaml"), "loop.yaml"),
+    ],
+)
+def test_a_link_that_leads_back_to_itself_is_one_line_that_names_it(config, call, arguments, file):
+    Image.new("RGB", (40, 30)).save("my.png")
+    for name in ("loop", "loop.yaml", "loop.png", "loop.py"):
+        Path(name).symlink_to(name)
+    code, _, error = call(*arguments)
+    assert (code, error.count("\n")) == (2, 1)
+    assert file in error
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,17 @@
 
 import contextlib
 import io
+import os
 import re
+import subprocess
+import sys
 from functools import cache, partial
 from pathlib import Path
 
 import pytest
 
 from holobench_eval.commands.configs import configs
+from holobench_eval.commands.displays import displays
 from holobench_eval.commands.list_ import KINDS, list_
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
@@ -55,6 +59,16 @@ def pages():
                 list_(name)
             found[name or "overview"] = " ".join(word for word in printed.getvalue().split() if word.count("/") < 2)
     return found
+
+
+@pytest.mark.parametrize("command", ["list", "displays"])
+def test_a_list_says_the_same_without_the_libraries_that_compute(command, capsys):
+    asked = f"from holobench_eval.commands import app; app([{command!r}], standalone_mode=False); import torch; "
+    asked += "print(torch.nn is torch)"
+    apart = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True, env=os.environ)
+    {"list": list_, "displays": partial(displays, None)}[command]()
+    *said, stood_in = apart.stdout.splitlines()
+    assert (said, stood_in) == (capsys.readouterr().out.splitlines(), "True")
 
 
 SAID = {

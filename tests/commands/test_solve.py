@@ -1,17 +1,22 @@
 """One picture is solved by one command, whose study can be run again."""
 
 import re
+from functools import partial
 from pathlib import Path
+from zipfile import ZipFile
 
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
+import typer
 
 from holobench_eval.commands.options import ARTIFACTS, learned_folder
-from holobench_eval.commands.solve import _entries, _study, solve
+from holobench_eval.commands.solve import MOST, _entries, _leave, _study, solve
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.installed import shipped_configs
+from holobench_eval.core.io import file_name
+from holobench_eval.study.scoring import picture as picture_scoring
 from tests.study.studies import planned
 
 FUNCTION = '''
@@ -32,15 +37,60 @@ def picture(tmp_path, monkeypatch, in_process):
     return Path("my picture.png")
 
 
+def files(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in Path(folder).rglob("*") if path.is_file())
+
+
 @pytest.mark.slow
-def test_several_methods_give_phases_captures_scores_and_a_picture(picture, capsys):
+def test_ten_files_are_left_and_what_was_computed_is_in_one_of_them(picture, capsys, monkeypatch):
     Path("mine.py").write_text(FUNCTION)
-    solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128))
-    folder, printed = Path("holoeval-results", "my picture"), capsys.readouterr().out.replace("\n", "")
-    for path in ("figures/answer-pictures.jpg", "phases/double_phase", "captures/flat"):
-        assert str(folder / path) in printed
-        assert (folder / path).exists()
+    folder, call = Path("holoeval-results", "my picture"), partial(solve, display="ideal", panel=(128, 128))
+    call("double_phase, mine.py:flat", picture)
+    printed = capsys.readouterr().out
+    of_both = [f"{what}/{label}.png" for what in ("captures", "phases") for label in ("double_phase", "flat")]
+    left = sorted(
+        [*of_both, "picture/my picture.png", "pictures.jpg", "report.html", "study.yaml", "study.zip", "table.csv"]
+    )
+    assert files(folder) == left
+    assert all(f"{folder / name}" in printed for name in left if "study" not in name and "picture/" not in name)
+    assert {path.name for path in folder.parent.iterdir()} == {"my picture", "solved"}
     assert set(pd.read_csv(folder / "table.csv")["label"]) >= {"double_phase", "flat"}
+    names = ZipFile(folder / "study.zip").namelist()
+    assert {"records.csv", "details.md", f"phases/flat/ideal/{file_name(picture.name)}.npy"} <= {*names}
+
+    monkeypatch.setattr(picture_scoring, "keep_pictures", None)  # whoever computes a cell again fails
+    before = (folder / "table.csv").read_bytes()
+    call("double_phase, mine.py:flat", picture)
+    assert (files(folder), (folder / "table.csv").read_bytes()) == (left, before)
+
+
+@pytest.mark.slow
+def test_a_failed_method_leaves_the_files_of_the_others_and_its_traces(picture, capsys):
+    Path("mine.py").write_text(FUNCTION.replace("return", "return missing +"))
+    with pytest.raises(typer.Exit):
+        solve("double_phase, mine.py:flat", picture, display="ideal", panel=(128, 128), output=Path("out"))
+    assert {"phases/double_phase.png", "captures/double_phase.png", "report.html"} <= {*files("out")}
+    (traces,) = Path(".out/records").glob("*.log")
+    assert "missing" in traces.read_text()
+    assert "tracebacks: .out/records/*.log" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("methods", "frames", "shown"), [(3, 1, {"phases"}), (5, 1, set()), (1, 8, {"captures"})])
+def test_of_more_methods_or_frames_a_kind_is_in_the_archive_alone(tmp_path, methods, frames, shown):
+    labels = [f"m{number}" for number in range(methods)]
+    for name in ("report.html", "table.csv", "figures/answer-pictures.jpg"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    for what, many in (("phases", frames), ("captures", 1)):
+        for label in labels:
+            (tmp_path / what / label / "ideal").mkdir(parents=True)
+            for number in range(many):
+                (tmp_path / what / label / "ideal" / f"my-frame-{number}.png").touch()
+    (tmp_path / "left").mkdir()
+    _leave(tmp_path, tmp_path / "left", labels)
+    found = files(tmp_path / "left")
+    assert {name.partition("/")[0] for name in found if "/" in name} == shown
+    assert len(found) <= MOST - 3
 
 
 def test_what_table_3_trained_serves_to_solve(picture):
@@ -53,11 +103,15 @@ def test_what_table_3_trained_serves_to_solve(picture):
 
 
 def test_parameters_are_set_of_each_method_or_of_one(picture):
-    given = ["rounds=1", "training.rate=2e-3", "mine.py:f.n=3", "wirtinger.loss=l1"]
-    wirtinger, mine = _entries(["wirtinger", "mine.py:f"], given)
-    assert wirtinger["params"] == {"rounds": 1, "training": {"rate": 0.002}, "loss": "l1"}
-    assert mine["params"] == {"rounds": 1, "training": {"rate": 0.002}, "n": 3}
+    given = ["iterations=1", "training.steps=2", "hil.network.width=8"]
+    hil, plus = _entries(["hil", "hil_plus"], given)
+    assert hil["params"] == {"iterations": 1, "training": {"steps": 2}, "network": {"width": 8}}
+    assert plus["params"] == {"iterations": 1, "training": {"steps": 2}}
     assert _entries(["wirtinger", "double_phase"], ["wirtinger.iterations=3"])[1] == "double_phase"
+    for key in ("mine.py:CamMethod", "CamMethod"):  # the label that tables print
+        assert _entries(["mine.py:CamMethod", "wirtinger"], [f"{key}.captures=5"])[0]["params"] == {"captures": 5}
+    with pytest.raises(UserError, match=r"--set CamMehtod.x=5: no method 'CamMehtod' among hil, wirtinger, and no key"):
+        _entries(["hil", "wirtinger"], ["CamMehtod.x=5"])
     with pytest.raises(UserError, match="--set loss: expected key=value"):
         _entries(["wirtinger"], ["loss"])
 
@@ -76,8 +130,9 @@ def test_a_display_of_one_laser_is_called_by_no_other_colour(picture, capsys):
     Path("one.yaml").write_text(f"name: one\nversion: 1\nseed: 1\ndescription: One.\nlike: leto-2020\n{panel}\n")
     solve("double_phase", picture, display="one.yaml", panel=(128, 128), output=Path("out"))
     assert "shown in gray, by the one wavelength of the display" in capsys.readouterr().out
-    (note,) = Path("out/captures").rglob("*.json")
-    written = "".join(Path("out", name).read_text() for name in ("details.md", "columns.md", note.relative_to("out")))
+    kept = ZipFile("out/study.zip")
+    (note,) = (name for name in kept.namelist() if name.startswith("captures/") and name.endswith(".json"))
+    written = "".join(kept.read(name).decode() for name in ("details.md", "columns.md", note))
     assert not re.findall(r"\b(?:red|green|R/G/B)\b", written)
 
 
@@ -87,15 +142,15 @@ def test_a_report_of_other_methods_pictures_or_displays_stays(picture):
     for display in ("ideal", "leto-mild"):
         solve("double_phase", picture, display=display, panel=(128, 128))
     names = ["my picture", "my picture-2", "my picture-3"]
-    files = [Path("holoeval-results", name, file) for name in names for file in ("report.md", "study.yaml")]
-    texts = [file.read_text() for file in files]
+    left = [Path("holoeval-results", name, file) for name in names for file in ("report.html", "study.yaml")]
+    texts = [file.read_text() for file in left]
     assert len(set(texts)) == 6
     solve("double_phase", picture, display="ideal", panel=(128, 128))  # the second once more
     assert sorted(path.name for path in Path("holoeval-results").iterdir()) == [*names, "solved"]
     for method in ("gerchberg_saxton", "wirtinker"):
         with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
             solve(method, picture, display="ideal", panel=(128, 128), output=Path("holoeval-results", names[1]))
-    assert [file.read_text() for file in files] == texts
+    assert [file.read_text() for file in left] == texts
 
 
 @pytest.mark.parametrize("name", ["other.png", "my picture.png"])
@@ -125,6 +180,8 @@ def test_files_of_others_are_not_replaced(picture):
         ("wirtinker", "", {}, "unknown method 'wirtinker'"),
         ("", "", {}, "methods"),
         ("double_phase", "", {"panel": (20, 20)}, "panel"),
+        ("double_phase", "", {"panel": (5000, 5000)}, "the panel of 'leto-2020' has 1080 x 1920 pixels, not"),
+        ("wirtinger", "", {"values": ["Wirtinger.step=1"]}, "no method 'Wirtinger' among wirtinger"),
         ("double_phase", "", {"display": "leto"}, "leto"),
         ("double_phase", "", {"display": "mine.yaml"}, "profile 'mine.yaml': no such file: mine.yaml"),
         ("phases", "", {}, "none of the files that it reads is there"),

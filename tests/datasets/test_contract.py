@@ -1,5 +1,6 @@
 """What every dataset must do: those with an entry point, and one that somebody keeps in a file of their own."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from PIL import Image
 
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
-from holobench_eval.datasets.base import clusters_of, fit, from_srgb, with_channels
+from holobench_eval.datasets.base import clusters_of, digest_of, fit, from_srgb, with_channels
 from holobench_eval.optics import srgb_decode
 
 STRANGER = """
@@ -91,6 +92,22 @@ def test_one_channel_is_the_luminance_of_three_and_two_are_refused(dataset):
     assert torch.allclose(dataset.load(item, (40, 56), channels=1)[0], weighted, atol=1e-6)
     with pytest.raises(UserError, match="3 channels"):
         dataset.load(item, (40, 56), channels=2)
+
+
+def test_a_dataset_without_a_digest_is_told_by_its_pixels():
+    @dataclass(frozen=True)
+    class Bare:
+        corner: float = 0.5
+
+        def load(self, item, shape, channels=3):
+            wide = torch.full((channels, 300, 400), len(item) / 10)
+            wide[:, :, :20] = self.corner
+            return fit(wide, shape)
+
+    assert len({digest_of(Bare(), "a"), digest_of(Bare(), "bb"), digest_of(Bare(0.6), "a")}) == 3
+    assert digest_of(Bare(), "a") == digest_of(Bare(), "a")
+    with pytest.raises(UserError, match=r"dataset 'Bare', image '5': TypeError: object of type 'int' has no len"):
+        digest_of(Bare(), 5)
 
 
 def test_items_are_unique_and_in_a_fixed_order_and_their_digests_are_sha256(dataset):

@@ -25,7 +25,8 @@ from holobench_eval.optics.phase import FARTHEST
 TAU = math.tau
 PANEL = (128, 128)
 FEW = {"iterations": 30}
-OPEN = {"double_phase": {}, "double_phase_aa": {}, "double_phase_bl": {}, "gerchberg_saxton": {}, "hio": {}}
+OPEN = {"double_phase": {}, "double_phase_aa": {}, "double_phase_bl": {}, "hio": {}}
+OPEN |= {"gerchberg_saxton": {"initial_phase": "random"}}
 OPEN |= {"wirtinger": FEW, "sgd": FEW, "multi_plane": FEW}
 OPEN |= {"wirtinger smooth": {"iterations": 100, "initial_phase": "constant"}}
 

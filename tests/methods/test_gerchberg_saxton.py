@@ -19,6 +19,8 @@ from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import basis
 
+FEW, RANDOM = GerchbergSaxton(iterations=30), GerchbergSaxton(iterations=30, initial_phase="random")
+
 
 @pytest.mark.parametrize(
     ("pupil", "start"), [(None, "random"), (None, "constant"), (0.6, "random"), (0.6, "constant"), ("lens", "random")]
@@ -48,6 +50,13 @@ def test_the_target_gets_the_light_that_the_start_sends_into_the_region_and_an_e
     after, error = step(phase, exact, model, region)
     assert float(error) < 1e-20
     assert torch.allclose(torch.remainder(after - phase + 1, 2 * torch.pi), torch.ones_like(phase))
+
+
+def test_the_default_start_is_the_better_one(make_bench, scene, linear_psnr):
+    bench = make_bench(pupil=0.6)
+    target = scene(bench.spec.region.width)
+    smooth, rough = (linear_psnr(method.solve(target, bench), target, bench) for method in (FEW, RANDOM))
+    assert smooth > rough + 3
 
 
 def test_hio_converges_further_than_gerchberg_saxton(bench, scene, linear_psnr):

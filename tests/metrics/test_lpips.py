@@ -75,7 +75,7 @@ def test_it_equals_the_formula(photograph, random_alexnet, tmp_path, network: Ne
 
 
 def test_without_weights_there_is_a_reason_and_no_number(photograph, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path))
     reason = available("alex")
     assert "\n" not in reason
     assert "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth" in reason
@@ -85,10 +85,14 @@ def test_without_weights_there_is_a_reason_and_no_number(photograph, tmp_path, m
 
 
 def test_the_hub_cache_is_searched_and_other_names_refused(random_alexnet: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
-    (tmp_path / "checkpoints").mkdir()
-    (tmp_path / "checkpoints" / "alexnet-owt-7be5be79.pth").symlink_to(random_alexnet)
-    assert available("alex") is None
+    for variable, folder in (("TORCH_HOME", tmp_path), ("XDG_CACHE_HOME", tmp_path / "torch")):
+        monkeypatch.delenv("TORCH_HOME", raising=False)
+        monkeypatch.setenv(variable, str(tmp_path))
+        checkpoints = folder / "hub" / "checkpoints"
+        assert checkpoints == Path(torch.hub.get_dir()) / "checkpoints"
+        checkpoints.mkdir(parents=True)
+        (checkpoints / "alexnet-owt-7be5be79.pth").symlink_to(random_alexnet)
+        assert available("alex") is None
     assert find_weights("vgg") is None
     with pytest.raises(UserError, match="no such file"):
         find_weights("alex", tmp_path / "absent.pth")

@@ -11,7 +11,8 @@ from holobench_eval.commands.options import changes_of, output_folder
 from holobench_eval.commands.reports.check import problems_in
 from holobench_eval.commands.reports.report import report
 from holobench_eval.core.errors import UserError
-from holobench_eval.study.changes import Changes, noted, recorded
+from holobench_eval.core.yaml_source import parse
+from holobench_eval.study.changes import Changes, changed, noted, recorded
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import plan
 from tests.study.studies import planned
@@ -65,6 +66,17 @@ def test_a_value_replaces_that_of_the_config_and_its_defaults(tmp_path):
     assert study.note.endswith(" a = b")
 
 
+def test_a_parameter_is_set_by_the_label_of_a_table_or_else_the_name_of_methods(tmp_path):
+    others = ("{name: seed, label: methods}", '{name: "mine.py:f.g", label: "a, b"}', "{name: hio, label: X}")
+    document = parse("", f"title: T\nmethods: [wirtinger, {', '.join(others)}, {{name: hio, label: X.Y}}]\n")
+    for key, rows in {"wirtinger": [0], "a, b": [2], "mine.py:f.g": [2], "X": [3], "X.Y": [4], "hio": [3, 4]}.items():
+        data = changed(document, Changes(values=(f"{key}.n=5",)), {"methods"}).data["methods"]
+        assert [row for row, each in enumerate(data) if isinstance(each, dict) and each.get("params")] == rows, key
+    assert changed(document, Changes(values=("methods.0.name=sgd",)), {"methods"}).data["methods"][0]["name"] == "sgd"
+    study = load_study(write(tmp_path, FULL), Changes(values=("GS.iterations=5", "wirtinger.step=0.5")))
+    assert (study.methods[1].params["iterations"], study.methods[0].params["step"]) == (5, 0.5)
+
+
 def test_methods_may_be_set_as_a_config_writes_them_and_then_chosen(tmp_path):
     path = write(tmp_path, FULL.replace("baseline: GS\n", "").replace("GS: {psnr", "wirtinger: {psnr"))
     values = ("methods=[wirtinger, sgd, {name: hio, label: HIO}]",)
@@ -74,7 +86,9 @@ def test_methods_may_be_set_as_a_config_writes_them_and_then_chosen(tmp_path):
 
 FAULTS = [
     (Changes(values=("seed=-1",)), "--set seed=-1: seed should be greater than or equal to 0, got -1"),
-    (Changes(values=("saves.phases=true",)), "--set saves.phases=true: unknown key 'saves' in the document"),
+    (Changes(values=("saves.phases=true",)), "--set saves.phases=true: no method 'saves' among wirtinger, GS, and no"),
+    (Changes(values=("GS.iterations=0",)), "--set GS.iterations=0: method 'gerchberg_saxton': parameter 'iterations'"),
+    (Changes(values=("methods=1", "GS.iterations=2")), "--set GS.iterations=2: no method 'GS' among "),
     (Changes(values=("methods.1.params.iterations=0",)), "--set methods.1.params.iterations=0: method 'gerchberg_sax"),
     (Changes(values=("display.profiles.0=idael",)), "--set display.profiles.0=idael: unknown profile 'idael'; did"),
     (Changes(values=("display={profiles: [idael]}",)), "--set display={profiles: [idael]}: unknown profile 'idael'"),

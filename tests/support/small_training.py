@@ -44,7 +44,8 @@ _HIL = {
     "retrieval": {"iterations": 0, "perceptual": 0, "ms_ssim": 0},
 }
 QUICK: dict[str, dict[str, Any]] = {
-    **{key: {"iterations": 6} for key in ("gerchberg_saxton", "hio")},
+    "gerchberg_saxton": {"iterations": 6, "initial_phase": "random"},
+    "hio": {"iterations": 6},
     **dict.fromkeys(("wirtinger", "sgd", "multi_plane"), _EARLY),
     "odak_sgd": {"iterations": 1},
     "wirtinger_gamma": {"images": 1, "of": _EARLY},

@@ -168,7 +168,7 @@ class Profile:
     def scaled(self, shape: tuple[int, int] | None) -> Profile:
         """The profile on a smaller panel: the pitch stays, the distance scales with the rows.
 
-        Light then spreads over the same fraction of the panel (K / N is constant). A side that is no smaller stays.
+        Light then spreads over the same fraction of the panel (K / N is constant).
 
         Parameters
         ----------
@@ -178,8 +178,8 @@ class Profile:
         Raises
         ------
         UserError
-            A side below 64 or above 8192 pixels; rows and columns in the other order; a panel with maps on another size
-            than its own.
+            A side below 64 or above 8192 pixels, or longer than that of the panel; rows and columns in the other order;
+            a panel with maps on another size than its own.
         """
         if shape is None:
             return self
@@ -189,16 +189,26 @@ class Profile:
         if tuple(shape) == own[::-1] != own:
             sides = f"{own[0]} rows and {own[1]} columns"
             raise UserError(f"'{self.name}' has {sides}; rows come first: {list(own)}, not {list(shape)}")
-        rows, columns = (min(given, side) for given, side in zip(shape, own, strict=True))
-        if (rows, columns) == own:
+        if tuple(shape) == own:
             return self
         if self.held or self.network.method:
             what, size = "maps" if self.held else "a network", f"{own[0]} x {own[1]}"
             raise UserError(
                 f"'{self.name}' has {what} of its panel of {size} pixels; give that panel, not {list(shape)}"
             )
-        distance = self.panel.distance * rows / self.panel.shape[0]
+        rows, columns = shape
+        if rows > own[0] or columns > own[1]:
+            raise UserError(
+                f"the panel of '{self.name}' has {own[0]} x {own[1]} pixels, not {list(shape)}; give at most these"
+            )
+        distance = self.panel.distance * rows / own[0]
         return replace(self, panel=replace(self.panel, shape=(rows, columns), distance=distance))
+
+    @property
+    def usual(self) -> tuple[int, int]:
+        """The panel where none is asked for: 256 x 256 pixels of it, or its own where it is smaller or has maps."""
+        rows, columns = self.panel.shape
+        return (rows, columns) if self.held or self.network.method else (min(rows, 256), min(columns, 256))
 
     def spec(self, shape: tuple[int, int] | None = None) -> DisplaySpec:
         """Nominal optics on a panel of ``shape`` (the profile's own by default)."""

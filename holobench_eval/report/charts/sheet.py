@@ -54,7 +54,7 @@ STEPS = 60  # of the hologram of the chart: it shows what the bench does, not wh
 def draw_sheet(name: str, panel: tuple[int, int] | None = None, output: Path | None = None) -> Path:
     """Draw the stages of a profile on a panel of (rows, columns), 256 x 256 by default; returns the PNG's path."""
     profile = load_profile(name)
-    shape = panel or (profile.panel.shape if profile.held else (256, 256))
+    shape = panel or profile.usual
     path = output or Path(f"stages-{profile.name}.png")
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise UserError(f"--output {path}: a picture is written as .png, .pdf or .svg")

@@ -18,6 +18,7 @@ from ...core.device import find, gpu_name, moved
 from ...core.errors import CellError, Pending, reason
 from ...core.hashing import canonical
 from ...core.reads import Seen, recorded
+from ...datasets.base import digest_of
 from ...display.learned import LearnedBench
 from .. import cost, isolation, opening
 from ..artifacts import FAILURE, Artifact, Artifacts
@@ -184,7 +185,7 @@ def _target(source: TargetSource, shape: tuple[int, int], channels: int) -> tupl
         dataset = plugins.build("datasets", name, json.loads(params), folder)
         if dataset_version(name, type(dataset)) != code:
             raise CellError(f"the code of dataset '{name}' {AGAIN}")
-        if dataset.digest(item) != sha256:
+        if digest_of(dataset, item) != sha256:
             raise CellError(f"target '{item}' {AGAIN}")
         target: Tensor = dataset.load(item, shape, channels=channels)
     if not target.any():

@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import math
+import re
 import struct
 import zipfile
 from collections.abc import Callable, Mapping
@@ -205,11 +206,12 @@ def test_a_profile_reads_its_maps_and_says_what_they_hold(tmp_path: Path) -> Non
 
 def test_a_profile_with_maps_has_one_panel(tmp_path: Path) -> None:
     profile = load_profile(str(written(tmp_path, packed(arrays()))))
-    assert profile.scaled(PANEL) is profile is profile.scaled((500, 500))
-    with pytest.raises(
-        UserError, match=r"^'lab' has maps of its panel of 64 x 80 pixels; give that panel, not \[64, 70\]$"
-    ):
-        profile.scaled((64, 70))
+    assert profile.scaled(PANEL) is profile
+    assert profile.usual == PANEL
+    for other in ([64, 70], [500, 500]):
+        message = f"^'lab' has maps of its panel of 64 x 80 pixels; give that panel, not {re.escape(str(other))}$"
+        with pytest.raises(UserError, match=message):
+            profile.scaled((other[0], other[1]))
 
 
 def test_changes_act_on_top_of_maps_or_are_refused(tmp_path: Path) -> None:

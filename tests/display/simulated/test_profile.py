@@ -1,6 +1,7 @@
 """Profiles are read with their effects, and a fault in one is a line with its place."""
 
 import math
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -38,8 +39,13 @@ def test_no_panel_is_larger_than_the_display_and_scaling_is_said():
     assert "full panel" in load_profile("ideal").scaling_note(None)
     assert "the distance goes from 100 to 23.7 mm" in load_profile("ideal").scaling_note((256, 256))
     profile = load_profile("leto-aged").scaled((100, 120))
-    assert profile.scaled((300, 110)).panel.shape == (100, 110)
-    assert profile.scaled((300, 110)).panel.distance == profile.panel.distance
+    assert (profile.usual, load_profile("leto-aged").usual) == ((100, 120), (256, 256))
+    for larger in ((101, 110), (100, 121), (5000, 5000)):
+        message = (
+            f"^the panel of 'leto-aged' has 100 x 120 pixels, not {re.escape(str(list(larger)))}; give at most these$"
+        )
+        with pytest.raises(UserError, match=message):
+            profile.scaled(larger)
 
 
 def test_digest_follows_the_file(tmp_path):
