@@ -47,19 +47,17 @@ def table(study: str, displays: list[str]) -> str:
     for label in ROWS:
         found = [groups[display].get(label) for display in displays]
         group, row = next(filter(None, found))
-        counts = sorted({each["photographs"] for _, each in filter(None, found)})  # a twin stops by itself
-        each_picture = group == own
-        numbers = (
-            f"{count / (targets if each_picture else 1):.0f}" for count in dict.fromkeys((counts[0], counts[-1]))
-        )
-        photographs = " to ".join(numbers) + (" a picture" if each_picture else " once" * bool(counts[-1]))
+        shared, word = (targets, " a picture") if group == own else (1, " once")
+        counts = sorted({round(each["photographs"] / shared) for _, each in filter(None, found)})
+        ends = dict.fromkeys((counts[0], counts[-1]))  # a twin stops by itself
+        photographs = " to ".join(map(str, ends)) + word * any(ends)
         cells = " | ".join(cell for one in found for cell in cells_of(one and one[1]))
         lines.append(f"| {row['title']} (`{row['registered']}`) | {photographs} | {cells} |")
     tests = (ROOT / "reports" / study / "tests.csv").read_text(encoding="utf-8").splitlines()
     gray = next(display["floor"] for display in board["displays"] if display["name"] == displays[0])
     lines.append(
-        f"\nBrackets: 95 % intervals of one comparison. {UNSHOWN}: not shown to differ (p ≥ 0.05, adjusted for "
-        f"{len(tests) - 1} comparisons), wherever the interval lies. –: not run there. A gray picture has {gray:.1f} {unit}."
+        f"\nBrackets: 95 % intervals, each of one comparison. {UNSHOWN}: not shown to differ (p ≥ 0.05, adjusted for "
+        f"{len(tests) - 1} comparisons). –: not run there. A gray picture has {gray:.1f} {unit}."
     )
     return "\n".join(lines)
 
