@@ -3,9 +3,9 @@ An error budget
 ===============
 
 What is wrong with a display's captures, and who could remove it? A small budget of
-the paper's display: three targets on a panel of 128 x 128 pixels, two models that
-learn from captures of three images. The full study has 28 targets, 32 training
-images, a network between the two models and many more steps; the shares of this one
+``leto-2020``: three targets on a panel of 128 x 128 pixels, two models that learn
+from captures of three images. The full study has 40 targets, 32 training images, a
+network between the two models and many more steps; the shares of this one
 are rough.
 """
 

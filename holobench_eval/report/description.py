@@ -126,7 +126,7 @@ def basis(profile: Profile) -> str:
     if profile.held:
         return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:
-        return f"{measured}; drawn from ranges, and kept since its captures have published figures"
+        return f"{measured}; drawn from ranges, and kept since its captures come near published figures"
     try:
         calibration = load_calibration(profile)
     except UserError:

@@ -56,8 +56,8 @@ def _answer(family: Family, rows: Sequence[Row], fit: Sequence[Row], order: Sequ
     unknown = [one.given.words for one in order if one.width > WIDE]
     return bullets(
         [
-            f"Captures of {len(fit)} of {len(rows)} draws ({len(fit) / len(rows):.0%}) have the published figures: "
-            f"{figures}, within {family.tolerance['psnr']:g} dB and {family.tolerance['ssim']:g}.",
+            f"Captures of {len(fit)} of {len(rows)} draws ({len(fit) / len(rows):.0%}) come within "
+            f"{family.tolerance['psnr']:g} dB and {family.tolerance['ssim']:g} of the published figures: {figures}.",
             f"{refused} draws could not be registered.",
             f"The figures determine {'; '.join(known) or 'no parameter'}.",
             f"They say next to nothing of: {', '.join(unknown) or 'no parameter'}.",

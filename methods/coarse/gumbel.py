@@ -31,8 +31,8 @@ class Gumbel(ByColour):
     A level's score falls with its distance from the phase; a softmax of score and Gumbel noise over a temperature
     weighs the levels' light. The temperature falls from iteration to iteration, until one level is left. Departures
     from the paper: what is weighed is the levels' light, not their phases, whose mean has no meaning around the circle;
-    the loss is of intensity; and the start is smooth. Time and memory grow with the number of levels. SI units
-    throughout.
+    the loss is of intensity; and the start is smooth. It is not the authors' code: scores agree on `plm-4bit`, and
+    differ by 7 dB and more on two levels. Time and memory grow with the number of levels. SI units throughout.
 
     Several frames are found together: the loss is that of their mean intensity, and they share one exposure. Each frame
     has noise of its own.
@@ -65,7 +65,7 @@ class Gumbel(ByColour):
     coldest: Annotated[float, Interval(gt=0, le=100)] = 1.0
     initial_phase: InitialPhase = "constant"
 
-    title: ClassVar[str] = "annealed descent on levels, Choi 2022"
+    title: ClassVar[str] = "annealed descent on levels, after Choi 2022"
     tuned: ClassVar[str] = "score, temperatures and step: on an ideal panel of two levels, with two photographs"
 
     def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:

@@ -1,4 +1,4 @@
-"""``holoeval calibrate``: what published figures say of a display: a fit, or a family of displays that have them."""
+"""``holoeval calibrate``: what published figures say of a display: a fit, or a family of displays near them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def calibrate(
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Draws side by side.")] = None,
 ) -> None:
-    """Fit a profile to published figures; with --draws, draw the family of displays that have them."""
+    """Fit a profile to published figures; with --draws, draw the family of displays near them."""
     if draws is not None:
         _family(profile, draws, output or RESULTS / f"{profile}-family", workers)
         return

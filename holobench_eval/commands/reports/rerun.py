@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Key = tuple[str, str, str, float]  # method's label, display, target and repeat: they name a cell in records.csv
 
 # Largest difference of a number between two machines: PSNR in dB, other scores in their own unit. Of the 812 cells of
-# Table 3, computed on processors of two makers, the largest were 0.045 dB and 0.016: docs/results/compare.md.
+# an earlier Table 3, on processors of two makers, the largest were 0.045 dB and 0.016: docs/results/compare.md.
 TOLERANCE_DB, TOLERANCE = 0.05, 0.02
 # How a capture was matched with its target: no score, and where the match has several equal answers, not one number.
 MATCHES = ("scale_", "match_factor", "refine_")

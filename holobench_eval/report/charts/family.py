@@ -1,4 +1,4 @@
-"""A family of displays: which of them have published figures, and what methods gain on those that do."""
+"""A family of displays: which of them come near published figures, and what methods gain on those that do."""
 
 from __future__ import annotations
 
