@@ -35,6 +35,9 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     many = thread_count(threads, where.workers, study)
     with watching(console) as watch:
         outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=tuple(metric or grid.metrics))
-    left = f"; {outcome.unscored} have nothing kept to score, and holoeval run computes them" * bool(outcome.unscored)
+    how = (
+        "without its record holoeval run photographs each again" if study.display.real else "holoeval run computes them"
+    )
+    left = f"; {outcome.unscored} have no whole capture of their own kept, and {how}" * bool(outcome.unscored)
     console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}")
     write_report(console, study, outcome.records, folder, outcome.provenance)

@@ -130,7 +130,7 @@ class TrainingBench:
 
         Returns the capture in the image's frame, ``(C, h, w)`` linear light; 1 is a white pixel at full efficiency.
         The noise depends on the study's seed, the image and ``names``. BudgetError when no capture is left, CellError
-        for an image that is neither one of the bench's nor an even gray: no scored target is photographed here.
+        for an image that is neither one of the bench's nor an even gray. What a phase would show is not looked at.
         """
         given = [known.target for known in (*self.images, *self.held_out) if known.item == image.item]
         own = any(known is image.target or torch.equal(known, image.target) for known in given)

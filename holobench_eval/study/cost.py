@@ -7,8 +7,8 @@ the time is estimated that a study takes.
 Linux keeps the largest resident set that a process ever had (``VmHWM`` in ``/proc/self/status``) and sets it back to
 the present one when 5 is written to ``/proc/self/clear_refs`` (proc(5)). Elsewhere memory is not measured.
 A method in a process of its own could do that, too, and could work before its clock or leave work to others. So its
-peak is looked up every ``EACH`` seconds, what it took from its fork until it was ready counts as wall time, and
-processor time and memory are those of all processes that it has started.
+peak is looked up every ``EACH`` seconds, what it took from its fork until it was ready counts as wall time, as does
+what it did since its last call, and processor time and memory are those of all processes that it has started.
 On a GPU the memory is that of torch's tensors on it, and the clock waits until the queued work is done.
 """
 
@@ -34,7 +34,7 @@ from ..core.hashing import digest
 from ..core.installed import __version__
 from ..core.io import write_atomically
 from .definition import Study
-from .executors.processes import children
+from .executors.processes import cpu_of, descendants
 from .plan import Plan, Task
 
 PROCESS = Path("/proc/self")
@@ -72,11 +72,11 @@ class Stopwatch:
 
     device: where the solution is computed; process: the number of the one that computes it, None for this one. What
     another process takes on a GPU is not measured. before: memory at the start, resident [KiB] or of a GPU [bytes]
-    (None: not measured).
+    (None: not measured); late: seconds for which it has worked before, see ``isolation.Opened``.
     """
 
-    def __init__(self, device: torch.device = CPU, process: int | None = None) -> None:
-        self.device, self.process = device, process
+    def __init__(self, device: torch.device = CPU, process: int | None = None, late: float = 0.0) -> None:
+        self.device, self.process, self.late = device, process, late
         self.before: int | None = None
         self.peak: _Peak | None = None
         if process is None:
@@ -98,7 +98,7 @@ class Stopwatch:
         """The cost since the start; of another process since its fork."""
         if self.on_gpu:
             torch.cuda.synchronize(self.device)
-        seconds, cpu, memory = time.perf_counter() - self.clock, _cpu(self.process), None
+        seconds, cpu, memory = self.late + time.perf_counter() - self.clock, _cpu(self.process), None
         if self.on_gpu and self.before is not None:
             memory = (torch.cuda.max_memory_allocated(self.device) - self.before) / _BYTES_PER_MIB
         elif self.before is not None:
@@ -109,7 +109,7 @@ class Stopwatch:
         if self.process is None:
             return Cost(seconds, memory, cpu - self.cpu)
         before = self.cpu if self.device.type == "cpu" else 0.0  # to open a GPU takes longer than many solutions
-        return Cost(seconds + before, memory, cpu)
+        return Cost(seconds + max(0.0, before - self.late), memory, cpu)
 
 
 class _Peak(threading.Thread):
@@ -145,24 +145,14 @@ def _cpu(process: int | None) -> float | None:
     if process is None:
         return time.process_time() + sum(os.times()[2:4])
     try:
-        return sum(map(_cpu_of, (process, *_started(process))))
+        return sum(map(cpu_of, (process, *_started(process))))
     except (OSError, ValueError):
         return None
 
 
-def _cpu_of(number: int) -> float:
-    # clock_getcpuclockid(3): the clock of another process; those that ended and were waited for are counted in ticks.
-    waited = (_process(number) / "stat").read_text().rpartition(")")[2].split()[13:15]
-    return time.clock_gettime(~number << 3 | 2) + sum(map(int, waited)) / os.sysconf("SC_CLK_TCK")
-
-
 def _started(process: int) -> list[int]:
     """Numbers of the processes that a method's process has started; the one it was forked from adopts their orphans."""
-    numbers, todo = list[int](), [_status("PPid", process) or process]
-    while todo:
-        todo = [child for number in todo for child in children(number)]
-        numbers += todo
-    return [number for number in numbers if number != process]
+    return [number for number in descendants(_status("PPid", process) or process) if number != process]
 
 
 @cache

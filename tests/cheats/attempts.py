@@ -9,6 +9,7 @@ import builtins
 import copy
 import ctypes
 import dataclasses
+import functools
 import gc
 import os
 import pickle
@@ -290,6 +291,24 @@ class WorksBeforeItIsAsked(LiesAboutTime, slow=True):
         time.sleep(0.4)
 
 
+@functools.cache
+def work_at_forks():
+    os.register_at_fork(after_in_child=lambda: [None for _ in iter(lambda: time.process_time() < 0.45, False)])
+
+
+class AtForks:
+    """Has the process that imports a class work in every fork, once it is asked for what the class declares."""
+
+    def __get__(self, instance, owner):
+        if __name__ != "tests.cheats.attempts":
+            work_at_forks()
+        raise AttributeError
+
+
+class WorksBeforeItIsReady(LiesAboutTime, slow=True, cpu=0.4):
+    tuned = AtForks()
+
+
 class StopsTheClock(LiesAboutTime, slow=True):
     def cheat(self, target, bench):
         time.perf_counter = time.monotonic = time.time = lambda: 0.0
@@ -457,6 +476,23 @@ class WritesIntoTheScorer(ReachingFurther):
 class AttachesToTheScorer(ReachingFurther):
     def reach(self, number, target):
         assert ctypes.CDLL(None).ptrace(16, number, None, None) == -1
+
+
+class BaresTheProcessesOfAll(ReachingFurther):
+    """By taking away the /proc of its own namespace, which covers that of all; from a namespace below it may do all."""
+
+    def cheat(self, target, bench):
+        libc = ctypes.CDLL(None)
+        libc.unshare(0x10000000 | 0x20000)  # CLONE_NEWUSER, CLONE_NEWNS
+        while not libc.umount2(b"/proc", 2):  # MNT_DETACH
+            pass
+        super().cheat(target, bench)
+
+    def reach(self, number, target):
+        file = Path(f"/proc/{number}/oom_score_adj")
+        file.write_text(file.read_text())
+        Path(f"/proc/{number}/clear_refs").write_text("1")
+        raise AssertionError(f"process {number} can be written to")
 
 
 class StopsTheScorerFromAnotherProgram(Reaching):
@@ -702,6 +738,19 @@ class WritesToATrainingImage(Trained):
     def image(self, bench):
         bench.images[0].target.mul_(torch.linspace(0, 1, bench.images[0].target.shape[-1]))
         return bench.images[0]
+
+
+class PhotographsATargetsHologram(Trained, outcome="trusted"):
+    """Under an even gray, which any training may show: what a phase would show is not looked at."""
+
+    def prepare(self, bench):
+        from holobench_eval.datasets.photographs import Photographs
+        from holobench_eval.display.training import TrainingImage
+        from holobench_eval.methods.double_phase import DoublePhase
+
+        target = Photographs(count=1).load("astronaut", bench.spec.region.shape, channels=len(bench.spec.wavelengths))
+        phase = bench.solved(DoublePhase(), TrainingImage("astronaut", target))
+        return {"seen": bench.photograph(phase, TrainingImage("gray", torch.full_like(target, 0.5)), "capture")}
 
 
 class TrainsBeyondItsBudget(Trained, reason="capture"):

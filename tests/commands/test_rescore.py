@@ -1,14 +1,18 @@
 """``holoeval rescore`` and ``check`` with a metric that came, or changed, after a study was run."""
 
+import json
+import re
 import shutil
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
-from holobench_eval.commands.reports.check import problems_in
+from holobench_eval.commands.reports.check import kept_in, problems_in
 from holobench_eval.commands.reports.report import report as write_again
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.hashing import digest
 from holobench_eval.lab.real import RealBench
 from holobench_eval.lab.session import read_manifest
 from holobench_eval.metrics import catalogue
@@ -56,6 +60,40 @@ def finished(tmp_path_factory):
     return config.parent
 
 
+def edited(record: Path) -> None:
+    """Give a record another score, and its digest anew."""
+    content = json.loads(record.read_text())
+    del content["sha256"]
+    content["scores"]["psnr"]["values"]["psnr_linear"] += 1
+    record.write_text(json.dumps({**content, "sha256": digest(content)}))
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("nothing", ""),
+        ("record", "double_phase on leto-mild, tv_lines: psnr_linear is .* in records/.*.json, and .* of the kept"),
+        ("row", "double_phase on leto-mild, tv_lines: psnr_linear is 1 in records.csv, and .* of the kept capture"),
+        ("capture", "double_phase on leto-mild, tv_lines: its kept capture is damaged, of another cell"),
+    ],
+)
+def test_a_record_that_its_kept_capture_does_not_give_is_told(finished, tmp_path, what, message, capsys):
+    shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
+    store, (first, second) = Store(tmp_path / "out"), cells(tmp_path / "study.yaml")
+    if what == "record":
+        edited(store.path(first.id))
+    if what == "row":
+        rows = pd.read_csv(tmp_path / "out/records.csv")
+        rows.loc[rows["cell"] == first.id, "psnr_linear_db"] = 1.0
+        rows.to_csv(tmp_path / "out/records.csv", index=False)
+    if what == "capture":
+        shutil.copy(store.capture(second.id), store.capture(first.id))
+    told = kept_in(tmp_path, 0)
+    assert capsys.readouterr().out.endswith("out: 2 of 2 kept captures scored again\n")
+    assert len(told) == bool(message), told
+    assert not told or re.search(message, told[0])
+
+
 @pytest.fixture
 def report(finished, tmp_path, add):
     """The folder of a finished study, whose config has named a metric more since."""
@@ -70,7 +108,7 @@ def test_the_column_of_a_new_metric_is_filled_and_written_into_the_tables(report
     before = pd.read_csv(report / "records.csv")
     said = succeed("rescore", config, "--output", report, "--metric", NAME, "--threads", 1)
     assert "14 captures scored again, 0 solved" in said
-    assert "nothing kept" not in said
+    assert "no whole capture" not in said
     after = pd.read_csv(report / "records.csv")
     (new,) = set(after) - set(before)
     assert new.startswith(COLUMN)
@@ -96,7 +134,10 @@ def test_what_nothing_kept_can_fill_is_said_and_stays_a_hole(report):
     forget(config)
     said = succeed("rescore", config, "--output", report)
     words = " ".join(said.split())
-    assert "12 captures scored again, 0 solved; 2 have nothing kept to score, and holoeval run computes them" in words
+    assert (
+        "12 captures scored again, 0 solved; 2 have no whole capture of their own kept, and holoeval run computes them"
+        in words
+    )
     assert pd.read_csv(report / "records.csv").filter(like=COLUMN).isna().sum().item() == 2
 
 
@@ -138,6 +179,7 @@ def test_no_photograph_of_a_display_that_exists_is_taken_or_asked_for_because_of
     add(1)
     session = sessions.moved(tmp_path, monkeypatch, sessions.STUDY.replace("[psnr]", f"[psnr, {NAME}]"))
     succeed("session", "import", session)
+    assert kept_in(session / "report", 0) == []
     photographs, photograph = list[str](), RealBench.photograph
 
     def photographed(self: RealBench, *args: Any, **named: Any) -> Any:
@@ -167,6 +209,7 @@ def test_scores_by_an_earlier_protocol_are_holes_until_the_kept_captures_are_sco
         build_report(load_study(config), outcome.records, folder, outcome.provenance)
     identity.versions.cache_clear()
     before = pd.read_csv(folder / "records.csv")
+    assert kept_in(folder, 0) == []  # there is nothing to compare
     with pytest.raises(UserError, match=r"no score 'psnr_linear' of today's versions \(protocol v2\)"):
         write_again(config, folder)
     said = succeed("rescore", config, "--output", folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections import Counter
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...core.errors import UserError, one_line
+from ...core.errors import CellError, UserError, one_line
 from ...core.installed import as_typed
 from ...core.panels import is_small
 from ..options import Learned
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from ...study.definition import Study
 
 NEEDED = ("records.csv", "table.csv")
+SAMPLE = 24  # kept captures of a report that are scored again
+SAME = 1e-3  # of a score, or in its unit: more than processors and libraries differ on one capture
 
 
 def check(
@@ -28,11 +31,12 @@ def check(
     rerun_cells: Annotated[
         int, typer.Option("--rerun", min=0, metavar="N", help="Solve, capture and score N cells of each report again.")
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Which cells are drawn for --rerun.")] = 0,
+    seed: Annotated[int, typer.Option(help="Which kept captures and which cells for --rerun are drawn.")] = 0,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
-    """Check that reports still follow from their records; with --rerun, also from their methods."""
+    """Check that reports still follow from their records and kept captures; with --rerun, also from their methods."""
     reports, problems = problems_in(folder)
+    problems += kept_in(folder, seed)
     if rerun_cells:
         problems += rerun_in(folder, rerun_cells, seed, artifacts)
     for problem in problems:
@@ -52,6 +56,54 @@ def problems_in(folder: Path) -> tuple[int, list[str]]:
     if not reports:
         raise UserError(f"{folder}: no report, and none in its folders (looked for {provenance.FILE})")
     return len(reports), [f"{report}: {problem}" for report in reports for problem in _problems(report)]
+
+
+def kept_in(folder: Path, seed: int) -> list[str]:
+    """Score a sample again of the captures that ``reports_in`` have kept; print of how many, and return a line for each
+    whose record, or whose row of records.csv, has another score."""
+    from ...core.seeds import seed as seed_of
+    from ...report import read_records, records_text
+    from ...report.data.scores import parse
+    from ...report.data.tables import score_columns
+    from ...study.plan import plan
+    from ...study.scoring.job import Job, Setting
+    from ...study.scoring.picture import verified
+    from ...study.store import Store
+
+    faults = list[str]()
+    for report, store in ((report, Store(report)) for report in reports_in(folder)):
+        if not any(store.folder.glob("*.npy")):
+            continue
+        try:
+            study, _ = finished(report)
+            tasks, frame = plan(study).tasks, read_records(records_text(report / "records.csv"))
+        except (UserError, OSError):  # which is among the problems
+            continue
+        names = {name: parse(name).key for name in score_columns(frame)}
+        rows = frame.drop_duplicates("cell").set_index("cell")[[*names]].rename(columns=names).to_dict("index")
+        setting = Setting(study, report, Path(), {}, threads=1, workers=1, device="cpu")
+        pairs = ((task, *pair) for task in tasks for pair in zip(task.cells, task.conditions, strict=True))
+        kept = [each for each in pairs if store.capture(each[1].id).is_file()]
+        chosen = sorted(kept, key=lambda each: seed_of("check", seed, each[1].id))[:SAMPLE]
+        print(f"{report}: {len(chosen)} of {len(kept)} kept captures scored again")
+        for task, cell, display in chosen:
+            where = f"{report}: {task.label} on {cell.condition}, {cell.target}"
+            try:
+                if (record := store.read(cell.id)) is None:
+                    continue
+                again = verified(Job(task, frozenset(), setting, alone=True), cell, display, record)
+            except (UserError, CellError) as error:
+                faults.append(f"{where}: {error}")
+                continue
+            for name, values in ((f"records/{cell.id}.json", record.values()), ("records.csv", rows.get(cell.id, {}))):
+                told = {key: float(values[key]) for key in again if key in values}
+                other = next((key for key in told if not math.isclose(told[key], again[key], abs_tol=SAME)), "")
+                if other:
+                    faults.append(
+                        f"{where}: {other} is {told[other]:g} in {name}, and {again[other]:g} of the kept capture"
+                    )
+                    break
+    return faults
 
 
 def _earlier(folder: Path) -> Iterator[str]:

@@ -25,7 +25,7 @@ from .tables import to_json
 # In the order of the board.
 GROUPS = {
     ONLINE: "With photographs of the picture itself",
-    CALIBRATED: "Trained on photographs of other pictures",
+    CALIBRATED: "With photographs taken in training",
     OPEN_LOOP: "No camera",
     GIVEN: "Photographs that were given",
     ORACLE: "Knows the display: the best phase known",

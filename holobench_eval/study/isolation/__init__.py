@@ -57,11 +57,12 @@ class Apart:
 @dataclass(frozen=True)
 class Opened:
     """A method that is ready for its calls. seen: what they have opened so far; pid: the number of its process, None
-    for a method that runs inside."""
+    for a method that runs inside; late: seconds for which it has worked since its last call, or while it got ready."""
 
     method: Any
     seen: Seen
     pid: int | None = None
+    late: float = 0.0
 
     @property
     def reads(self) -> Reads:
@@ -80,11 +81,11 @@ def opened(method: Any, device: torch.device) -> Iterator[Opened]:
         code = running.facts.code
         if code is not None and code.sha256 != method_version(type(method)):
             raise CellError(f"the code of {method.file} {AGAIN}")
-        with running.opened(device, method.limits) as (pid, channel):
+        with running.opened(device, method.limits) as (pid, channel, late):
             seen = Seen()
             method._running = partial(process.call, channel, seen)
             try:
-                yield Opened(method, seen, pid)
+                yield Opened(method, seen, pid, late)
             finally:
                 method._running = None
 

@@ -84,7 +84,7 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
                 namespace.end_with_parent()
                 control.close()
                 os.setsid()
-                with suppress(EOFError, ConnectionError):  # one that was forked and is not needed
+                with suppress(EOFError, ConnectionError):  # the harness has ended
                     _call(Channel(Connection(number)), cls, f"method '{name}'", code.folder if code else "")
                 os._exit(0)
             os.close(number)
@@ -99,6 +99,11 @@ def serve(control: Connection, name: str, folder: Path, home: Path) -> None:
                 channel.receive()
             channel.send(status)
     os._exit(0)  # whatever threads the file has left
+
+
+def opens(device: str) -> None:
+    """Open a device, as every call begins with it."""
+    torch.zeros(1, device=find(device))
 
 
 def _imported(name: str, folder: Path) -> tuple[type[Any], str]:
@@ -190,7 +195,7 @@ def _call(channel: Channel, cls: type[Any], owner: str, folder: str) -> None:
     if setting["memory_gib"] is not None:
         _limit_memory(setting["memory_gib"])
     with repeatable(setting["threads"], device):
-        torch.zeros(1, device=device)  # a GPU is opened before the clock runs
+        opens(setting["device"])
         channel.send("ready")
         call = channel.receive()
         with recorded() as opened:

@@ -36,18 +36,26 @@ def enter() -> bool:
 
 
 def _enter() -> None:
-    user, group = os.geteuid(), os.getegid()
-    if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNS):
-        raise OSError("no namespaces")
-    _map("uid_map", user)
-    Path("/proc/self/setgroups").write_text("deny")  # else who is not root may map no group, user_namespaces(7)
-    _map("gid_map", group)
+    _unshare(CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNS)
     if first := os.fork():
         _end_as(os.waitpid(first, 0)[1])
     end_with_parent()
     # So that a number of /proc is one of this namespace; the mount is seen in it alone.
     if libc.mount(b"none", b"/", None, MS_REC | MS_PRIVATE, None) or libc.mount(b"proc", b"/proc", b"proc", 0, None):
         raise OSError("no /proc of its own")
+    # What is mounted in the namespace above can be taken away by nobody in one below (mount_namespaces(7)), whatever
+    # that one may: else the method could bare the /proc of all processes, and write to what it has of its user's.
+    _unshare(CLONE_NEWUSER | CLONE_NEWNS)
+
+
+def _unshare(namespaces: int) -> None:
+    """Enter new namespaces as the same user. OSError where the system forbids it."""
+    user, group = os.geteuid(), os.getegid()
+    if libc.unshare(namespaces):
+        raise OSError("no namespaces")
+    Path("/proc/self/uid_map").write_text(f"{user} {user} 1")
+    Path("/proc/self/setgroups").write_text("deny")  # else who is not root may map no group, user_namespaces(7)
+    Path("/proc/self/gid_map").write_text(f"{group} {group} 1")
 
 
 def end_with_parent() -> None:
@@ -58,16 +66,6 @@ def end_with_parent() -> None:
 def adopt() -> None:
     """Let the processes whose parent has ended before them become children of this one."""
     libc.prctl(PR_SET_CHILD_SUBREAPER, 1)
-
-
-def _map(file: str, own: int) -> None:
-    """Keep the numbers of users or groups: all where this process may map them, as root may, else its own. OSError
-    where it may map none."""
-    for line in ("0 0 4294967295", f"{own} {own} 1"):
-        with suppress(OSError):
-            Path("/proc/self", file).write_text(line)
-            return
-    raise OSError(f"no {file}")
 
 
 def _end_as(status: int) -> None:

@@ -6,9 +6,11 @@ import os
 import signal
 import socket
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from multiprocessing import reduction, util
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -30,9 +32,9 @@ from ...display.metered import MeteredDisplay
 from ...display.training import TrainingBench
 from ...display.traits import Function
 from ..definition import Limits
-from ..executors.processes import CONTEXT, children, number_within, start
+from ..executors.processes import CONTEXT, children, cpu_of, descendants, number_within, start
 from .handles import answer, known
-from .inside import serve
+from .inside import opens, serve
 from .messages import Channel, GarbledError
 
 KEPT = 32  # processes of methods that stay when they have nothing to do
@@ -41,7 +43,6 @@ MOST_PROCESSES = 2**22  # of Linux, proc(5), pid_max
 ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it answers
 ERRORS = {cls.__name__: cls for cls in (UserError, CellError, BudgetError)}
 Handle = MeteredDisplay | TrainingBench
-Fork = tuple[dict[str, Any], Channel]  # a process for one call: what it gets ready with, and the way to it
 
 
 def _shown(text: str) -> str:
@@ -85,14 +86,10 @@ RESULTS: dict[str, TypeAdapter[Any]] = {  # of functions that a method has besid
 
 
 class MethodProcess:
-    """A process that has imported a method, and forks one for every call; after a call the next at once, which gets
-    ready while the result is scored.
+    """A process that has imported a method, and forks one for every call.
 
     facts: what the method is. UserError for a method that cannot be imported.
     """
-
-    _next: Fork | None = None
-    _ends = False  # whether it is still to tell how the last call ended, before the number of the next
 
     def __init__(self, name: str, folder: Path, home: Path) -> None:
         ours, theirs = CONTEXT.Pipe()
@@ -116,7 +113,7 @@ class MethodProcess:
         if not self._is_told_truly(facts.code):
             self.end()
             raise UserError(f"method '{name}': its process does not say which files its code is; run the command again")
-        self.facts, self.states = facts, self._states(facts)
+        self.facts, self.states, self.at_rest = facts, self._states(facts), self._cpu()
 
     def _is_told_truly(self, code: Code | None) -> bool:
         """Whether the code can be that of the file, where one is named: what the file does while it is imported could
@@ -141,8 +138,6 @@ class MethodProcess:
     def end(self) -> None:
         """Kill the process and all that it has started."""
         self.at_exit.cancel()  # it would keep this object, and its files open, until the harness ends
-        if self._next is not None:
-            self._next[1].connection.close()
         left = list[psutil.Process]()
         with suppress(psutil.Error):
             left = psutil.Process(self.process.pid).children(recursive=True)
@@ -154,17 +149,17 @@ class MethodProcess:
         self.control.connection.close()
 
     @contextmanager
-    def opened(self, device: torch.device, limits: Limits) -> Iterator[tuple[int, Channel]]:
-        """The number of a process that is ready for its calls, and the way to it (see ``call``); it ends with the
-        context. It computes on a device, with as many threads as this one.
+    def opened(self, device: torch.device, limits: Limits) -> Iterator[tuple[int, Channel, float]]:
+        """The number of a process that is ready for its calls, the way to it (see ``call``), and the seconds for which
+        the method has worked before; it ends with the context. It computes on a device, with as many threads as this
+        one.
 
         CellError where it ends by itself, sends what is no answer, or reaches a limit.
         """
-        setting = {"device": str(device), "threads": torch.get_num_threads(), "memory_gib": limits.memory_gib}
+        usual, idle, began = usually(device), self._cpu() - self.at_rest, time.perf_counter()
         late = threading.Event()
         channel: Channel | None = None
         failure: Exception | None = None
-        is_left = False
 
         def stop() -> None:
             late.set()
@@ -175,16 +170,16 @@ class MethodProcess:
         timer = threading.Timer(min(limits.seconds, threading.TIMEOUT_MAX), stop)
         timer.daemon = True
         try:
-            pid, channel = self._forked(setting)
+            ours, theirs = CONTEXT.Pipe()
+            channel = Channel(ours)
+            with theirs:
+                reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
+            threads = torch.get_num_threads()
+            channel.send({"device": str(device), "threads": threads, "memory_gib": limits.memory_gib})
+            pid = self._number(self._told())
             timer.start()
             channel.receive()
-            yield pid, channel
-            with suppress(OSError):  # one that has ended is not current
-                self._end_call()
-                is_left = True
-                if device.type == "cpu":  # on a GPU it would hold memory while it waits
-                    self._next = self._fork(setting)
-            return
+            yield pid, channel, idle + max(0.0, time.perf_counter() - began - usual)
         except (EOFError, OSError, GarbledError) as error:
             failure = error
         except KeyboardInterrupt:
@@ -194,37 +189,22 @@ class MethodProcess:
             timer.cancel()
             if channel is not None:
                 channel.connection.close()
-            ending = "" if is_left else self._ending()
+            ending = self._ending()
+            self.at_rest = self._cpu()
+        if failure is None:
+            return
         if late.is_set():
             raise CellError(f"took more than {limits.seconds:g} s, the limit of the study")
         what = "sent what is no answer" if isinstance(failure, GarbledError) else ending
         raise CellError(f"the process of the method {what}")
 
-    def _forked(self, setting: dict[str, Any]) -> tuple[int, Channel]:
-        """The number of a process that gets ready for a call, and the way to it. EOFError, OSError without one."""
-        (prepared, channel), self._next = self._next or self._fork(setting), None
-        if self._ends:
-            self._told()
-            self._ends = False
-        pid = self._number(self._told())
-        if prepared == setting:
-            return pid, channel
-        channel.connection.close()
-        self._end_call()
-        return self._forked(setting)
-
-    def _fork(self, setting: dict[str, Any]) -> Fork:
-        """Ask for a process that gets ready for a call."""
-        ours, theirs = CONTEXT.Pipe()
-        with theirs:
-            reduction.send_handle(self.control.connection, theirs.fileno(), self.process.pid)
-        channel = Channel(ours)
-        channel.send(setting)
-        return setting, channel
-
-    def _end_call(self) -> None:
-        self.control.send("end")
-        self._ends = True
+    def _cpu(self) -> float:
+        """Processor time [s] of all its processes up to now; between two calls they should take none."""
+        outer, taken = int(self.process.pid or 0), 0.0
+        for number in (outer, *descendants(outer)):
+            with suppress(OSError, ValueError):  # of one that has ended, and of a system without /proc
+                taken += cpu_of(number)
+        return taken
 
     def _number(self, within: int) -> int:
         """The number here of a process that it has forked, which has another one within; 0 for one that has ended."""
@@ -245,16 +225,22 @@ class MethodProcess:
     def _ending(self) -> str:
         """End a call, and say how it ended by itself."""
         try:
-            if self._ends:
-                raise GarbledError("no end of the call before")
-            self._end_call()
-            status, self._ends = self._told(), False
+            self.control.send("end")
+            status = self._told()
         except (EOFError, OSError, GarbledError):
             self.end()
             return "has ended the process that it came from"
         if -status in signal.valid_signals():
             return f"was ended by {signal.Signals(-status).name}"
         return f"ended with exit code {status}"
+
+
+@cache
+def usually(device: torch.device) -> float:
+    """Seconds that a process takes which does nothing but open a device: a method's should be ready by then."""
+    began = time.perf_counter()
+    start(opens, str(device)).join()
+    return time.perf_counter() - began
 
 
 def call(channel: Channel, seen: Seen, function: str, params: dict[str, Any], args: Sequence[Any]) -> Any:

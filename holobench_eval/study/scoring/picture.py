@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,14 @@ from ..artifacts import Artifact
 from ..displays import Condition
 from ..phases import Solution
 from ..plan import Cell
+from ..stacks import INFOCUS
 from ..store import Record
 from .job import Job, Measured
 from .pictures import write_capture, write_phase, write_thumbnail
 from .scores import keep_capture, kept_capture, scores_of
 from .solution import solution
+
+VERIFIED = (identity.MATCH, "psnr", "ssim", INFOCUS)  # scores that take milliseconds
 
 
 def picture(job: Job) -> Measured:
@@ -95,11 +98,30 @@ def references(job: Job, wanted: Callable[[Cell, Condition], Tensor]) -> Measure
 
 def rescored(job: Job, cell: Cell, display: Condition) -> Record:
     """The record of a captured cell, with the scores that it lacked."""
-    record, kept = job.store.read(cell.id), kept_capture(job.store.capture(cell.id))
+    record = job.store.read(cell.id)
     assert record is not None
-    image, wanted = kept if len(kept) > 1 else (kept[0], job.target(cell, display))
-    scores = scores_of(job, cell, image, wanted, identity.lacking(record.scores, job.setting.metrics))
+    scores = _of_kept(job, cell, display, identity.lacking(record.scores, job.setting.metrics))
     return replace(record, scores=record.scores | scores)
+
+
+def verified(job: Job, cell: Cell, display: Condition, record: Record) -> dict[str, float]:
+    """The headline, PSNR and SSIM of a kept capture, by column, of those that its record has by today's versions.
+    CellError where nothing is kept that is whole."""
+    if not kept_capture(job.store.capture(cell.id)):
+        raise CellError("its kept capture is damaged, of another cell, or kept by an earlier state of the package")
+    headline = job.setting.study.headline
+    metrics = {
+        name: entry["version"]
+        for name, entry in record.scores.items()
+        if identity.is_current(name, entry["version"]) and (name in VERIFIED or headline in entry["values"])
+    }
+    return identity.flat(_of_kept(job, cell, display, metrics, refine=False, blur=()))
+
+
+def _of_kept(job: Job, cell: Cell, display: Condition, metrics: Mapping[str, str], **less: Any) -> dict[str, Any]:
+    kept = kept_capture(job.store.capture(cell.id))
+    image, wanted = kept if len(kept) > 1 else (kept[0], job.target(cell, display))
+    return scores_of(job, cell, image, wanted, metrics, **less)
 
 
 def _second_scores(

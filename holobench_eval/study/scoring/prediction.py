@@ -101,7 +101,7 @@ def _predictor(
     def predict(phase: Tensor) -> tuple[Tensor, cost.Cost, Reads]:
         own = phase[None].to(job.device, copy=True)
         with isolation.opened(method, job.device) as ready:
-            watch = cost.Stopwatch(job.device, ready.pid)
+            watch = cost.Stopwatch(job.device, ready.pid, ready.late)
             predicted = method.predict(own, handle)
             taken = watch.stop()
         predicted = from_numpy(predicted)

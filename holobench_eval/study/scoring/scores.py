@@ -32,11 +32,12 @@ def scores_of(
     wanted: Tensor,
     metrics: Mapping[str, str],
     answers: Mapping[str, float] = MappingProxyType({}),
+    **less: Any,
 ) -> dict[str, Any]:
     """The scores of an image ``(C, h, w)`` against ``wanted``, by metric. metrics: versions of those to compute;
-    answers: the columns of control, which no image alone has."""
+    answers: the columns of control, which no image alone has; less: what ``metrics.score`` is to leave out."""
     names = identity.named(metrics)
-    columns = score(image, wanted, metrics=names, lpips_weights=job.setting.study.protocol.lpips_weights)
+    columns = score(image, wanted, metrics=names, lpips_weights=job.setting.study.protocol.lpips_weights, **less)
     if INFOCUS in metrics:
         dataset = plugins.build("datasets", cell.dataset, dict(cell.dataset_params), job.setting.study.folder)
         columns |= in_focus(image, wanted, dataset.mask(cell.target, tuple(wanted.shape[-2:])))
@@ -61,8 +62,8 @@ def in_focus(image: Tensor, wanted: Tensor, mask: Tensor) -> dict[str, float]:
 
 
 def keep_capture(job: Job, cell: Cell, *images: Tensor, lasting: bool = False) -> None:
-    """Keep an image ``(C, h, w)``, or one with the picture that it is compared with, as exact as it is scored; unless
-    the study says not to.
+    """Keep an image ``(C, h, w)``, or one with the picture that it is compared with, as exact as it is scored and under
+    the name of its cell; unless the study says not to.
 
     lasting: of a display that exists, whose exposures cost time.
     """
@@ -70,13 +71,13 @@ def keep_capture(job: Job, cell: Cell, *images: Tensor, lasting: bool = False) -
         return
     buffer = io.BytesIO()
     np.save(buffer, torch.stack(images).squeeze(0).cpu().numpy(), allow_pickle=False)
-    write_atomically(job.store.capture(cell.id), sealed(buffer.getvalue()), lasting)
+    write_atomically(job.store.capture(cell.id), sealed(buffer.getvalue(), cell.id), lasting)
 
 
 def kept_capture(path: Path) -> list[Tensor]:
     """What ``keep_capture`` kept: an image, and where it has one of its own the picture that it is compared with; empty
-    where nothing is kept that is whole."""
-    array = unsealed(path.read_bytes()) if path.is_file() else None
+    where nothing is kept that is whole and of the cell that the file is named after."""
+    array = unsealed(path.read_bytes(), path.stem) if path.is_file() else None
     if array is None:
         return []
     values = torch.from_numpy(np.load(io.BytesIO(array), allow_pickle=False))

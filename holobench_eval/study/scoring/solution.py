@@ -77,7 +77,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
 def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: Solve) -> Solution:
     """What a method finds by ``solve``. CellError for what is no phase; label: how the error calls the method."""
     with isolation.opened(method, job.device) as ready:
-        watch = cost.Stopwatch(job.device, ready.pid)
+        watch = cost.Stopwatch(job.device, ready.pid, ready.late)
         output, stopped = _within_budget(method, solve, handle)
         taken = watch.stop()
     output, channels = from_numpy(output), len(handle.spec.wavelengths)

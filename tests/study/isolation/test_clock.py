@@ -9,8 +9,10 @@ import pytest
 
 from holobench_eval.core.device import CPU
 from holobench_eval.study import cost, isolation
+from holobench_eval.study.isolation import process
 from tests.support import plugins
-from tests.support.plugins.burning import BURNER, MIB
+from tests.support.patience import wait_until
+from tests.support.plugins.burning import BURNER, MIB, SECONDS
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured on Linux alone")
 
@@ -20,7 +22,7 @@ def taken_by(name: str, folder: Path, more: str = "") -> cost.Cost:
     (folder / "mine.py").write_text(plugins.text("burning") + more)
     method = isolation.build(f"mine.py:{name}", {}, folder)
     with isolation.opened(method, CPU) as ready:
-        watch = cost.Stopwatch(CPU, ready.pid)
+        watch = cost.Stopwatch(CPU, ready.pid, ready.late)
         method.solve(None, None)
         return watch.stop()
 
@@ -56,11 +58,46 @@ def test_memory_and_processor_time_are_those_of_all_its_processes_at_any_time(na
         assert not at_work(tmp_path)
 
 
-def test_work_before_the_call_is_on_the_clock(tmp_path):
-    taken = taken_by("Plain", tmp_path, "\nos.register_at_fork(after_in_child=burn)\n")
-    assert taken.seconds > 0.3
-    assert taken.cpu_s is not None
-    assert taken.cpu_s > 0.3
+IN_A_THREAD = "lambda: (threading.Thread(target=burn).start(), time.sleep(SECONDS))"
+BY_ANOTHER = "lambda: subprocess.run([sys.executable, '-c', BURNED], stdout=subprocess.DEVNULL)"
+
+
+WORKS_WHEN_TOLD = """
+import threading
+
+def work():
+    while not Path("begin").exists():
+        time.sleep(0.01)
+    burn()
+    Path("worked").touch()
+
+os.register_at_fork(after_in_parent=lambda: threading.Thread(target=work).start())
+"""
+
+
+@pytest.mark.parametrize(
+    "handler",
+    [
+        *(f"after_in_child={work}" for work in ("burn", "lambda: time.sleep(SECONDS)", IN_A_THREAD, BY_ANOTHER)),
+        *(f"before={work}" for work in ("burn", BY_ANOTHER)),
+    ],
+)
+def test_what_a_method_does_before_its_call_is_on_the_clock(handler, tmp_path, monkeypatch):
+    monkeypatch.setattr(process, "usually", lambda device: 0.0)
+    taken = taken_by("Plain", tmp_path, f"\nimport threading\nos.register_at_fork({handler})\n")
+    assert taken.seconds > SECONDS
+    if handler == "after_in_child=burn":
+        assert taken.cpu_s is not None
+        assert taken.cpu_s > SECONDS
+
+
+def test_work_between_two_calls_is_on_the_clock_of_the_second(tmp_path):
+    (tmp_path / "mine.py").write_text(plugins.text("burning") + WORKS_WHEN_TOLD)
+    method = isolation.build("mine.py:Plain", {}, tmp_path)
+    Path("begin").touch()
+    wait_until(Path("worked").exists)
+    with isolation.opened(method, CPU) as ready:
+        assert ready.late > SECONDS
 
 
 def test_processes_that_start_with_its_import_are_refused(tmp_path):

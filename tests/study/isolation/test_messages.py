@@ -100,9 +100,9 @@ on_linux = pytest.mark.skipif(sys.platform != "linux", reason="namespaces are of
 REFUSALS = {
     "nothing": "",
     "unshare": "namespace.libc = SimpleNamespace(unshare=lambda _: -1)",
-    "maps": "namespace._map = forbidden",
-    "groups": "namespace.Path = lambda *_: SimpleNamespace(write_text=forbidden)",
-    "/proc": "namespace.libc = SimpleNamespace(unshare=libc.unshare, prctl=libc.prctl, mount=lambda *_: -1)",
+    "below": "namespace.libc = SimpleNamespace(**kept, unshare=lambda of: libc.unshare(of) if of & NEWPID else -1)",
+    "maps": "namespace.Path = lambda *_: SimpleNamespace(write_text=forbidden)",
+    "/proc": "namespace.libc = SimpleNamespace(**kept | {'mount': lambda *_: -1}, unshare=libc.unshare)",
 }
 CODE = f"""
 import os
@@ -113,7 +113,8 @@ from holobench_eval.study.isolation import namespace
 def forbidden(*_):
     raise OSError
 
-libc = namespace.libc
+libc, NEWPID = namespace.libc, namespace.CLONE_NEWPID
+kept = {{"mount": libc.mount, "prctl": libc.prctl}}
 for name, change in {REFUSALS}.items():
     if child := os.fork():
         os.waitpid(child, 0)
@@ -137,7 +138,7 @@ def entered():
 
 
 @on_linux
-@pytest.mark.parametrize("refusal", ["unshare", "maps", "groups", "/proc"])
+@pytest.mark.parametrize("refusal", ["unshare", "below", "maps", "/proc"])
 def test_where_a_part_is_forbidden_nothing_changes(entered, refusal):
     assert entered[refusal][:3] == ["False", "True", "True"]
 

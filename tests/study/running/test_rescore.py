@@ -214,16 +214,17 @@ def test_a_study_that_keeps_no_captures_is_scored_again_from_its_phases(study, d
     assert not list((config.parent / "out" / "records").glob("*.npy"))
 
 
-@pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file"])
+@pytest.mark.parametrize("damage", ["truncated", "a bit", "empty", "another file", "another cell's"])
 def test_the_phase_of_a_damaged_capture_is_photographed_again(study, done, damage):
     config = study()
-    file = Store(config.parent / "out").capture(cells(config)[0].id)
+    file, other = (Store(config.parent / "out").capture(cell.id) for cell in cells(config)[:2])
     content = file.read_bytes()
     bad = {
         "truncated": content[: len(content) // 2],
         "a bit": content[:9000] + bytes([content[9000] ^ 1]) + content[9001:],
         "empty": b"",
         "another file": b"PNG" * 100,
+        "another cell's": other.read_bytes(),
     }
     file.write_bytes(bad[damage])
     again = compute(config, rescore=(NAME,))
