@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..imaging.warp import Array
+from .counts import step
 from .dark import Dark
 from .devices import Camera, Counts, DeviceError
+from .photograph import MOST_SATURATED
 
 FILL, PERCENTILE = 0.7, 99.9  # where auto exposure puts which samples, as a part of the range from dark to white
 ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full stops
 DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
 TRIES = 16
 STRONGEST_STEP = 32.0
+FRAMES = 4  # of a burst: so many less one may be late and are found out
+LIT = 1.0  # seconds that show any picture
+SHALLOWEST = 15  # counts of a picture that tell how deep they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,20 +35,79 @@ class Averaged:
 
 def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged:
     """Mean of ``count`` frames; plane: the one that is taken of a colour camera's. DeviceError for no good frame."""
-    shortest, longest = camera.exposures
     total: Array = np.zeros(())
     saturated: NDArray[np.bool_] = np.zeros((), dtype=bool)
     took = 0.0
     for _ in range(count):
-        frame, real = _exposed(camera, min(max(seconds, shortest), longest), plane)
+        frame, real = exposed(camera, seconds, plane)
         if total.ndim and total.shape != frame.shape:
             raise DeviceError(f"{camera.name}: a frame of {frame.shape} follows one of {total.shape}")
         total, saturated, took = total + frame, saturated | (frame >= camera.white), took + real
     return Averaged(total / count, saturated, took / count)
 
 
-def _exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
-    frame, real = camera.expose(seconds)
+def burst(camera: Camera, seconds: float, plane: int) -> list[Array]:
+    """Some frames that follow each other, in floating point."""
+    return [exposed(camera, seconds, plane)[0].astype(float) for _ in range(FRAMES)]
+
+
+def late(before: Sequence[Array], after: Sequence[Array]) -> int | None:
+    """How many frames after a change still show what was before it; None where the change is not seen.
+
+    before, after: bursts, long after the picture and the exposure of each were set.
+    """
+    (*_, old), (*_, last, new) = before, after
+    if len(shapes := sorted({frame.shape for frame in (*before, *after)})) > 1:
+        raise DeviceError(f"frames differ in size: {shapes}")
+    if not _apart(old, new) > 3 * _apart(last, new):
+        return None
+    return sum(_apart(frame, old) < _apart(frame, new) for frame in after)
+
+
+def _apart(one: Array, other: Array) -> float:
+    return float(np.sqrt(np.mean((one - other) ** 2)))
+
+
+def refuse_late(camera: Camera, plane: int) -> None:
+    """DeviceError for a camera whose first frame after a change of the exposure is from before it, in steady light."""
+    shortest, longest = camera.exposures
+    before, *others = np.geomspace(shortest, max(min(longest, LIT), shortest), 4)
+    frames = burst(camera, before, plane)
+    for seconds in others:
+        frames, earlier = burst(camera, seconds, plane), frames
+        if (count := late(earlier, frames)) is not None:
+            break
+        if np.array_equal(frames[-1], earlier[-1]) and not _dark(frames[-1]):
+            raise DeviceError(
+                f"{camera.name}: gives one and the same frame, byte for byte, at exposures of {before:.2g} and "
+                f"{seconds:.2g} s; does it return the last frame again, or ignore its exposure?"
+            )
+    else:
+        return  # too little light to tell
+    if count:
+        raise DeviceError(
+            f"{camera.name}: frame {count + 1} after a change of the exposure is the first with the new one; empty its "
+            "queue of frames before each, or trigger each"
+        )
+
+
+def miscounted(frame: Counts, white: float) -> str:
+    """What a picture tells of wrong counts, "" for nothing: that they end below white, or are not low-justified."""
+    top, low = int(frame.max()), int(np.percentile(frame, 1))
+    share, below = np.mean(frame == top), np.mean((frame < top) & (frame >= top - max(0.05 * (top - low), 1)))
+    unit = step(frame[frame < top])
+    if unit > 1 and top - low > SHALLOWEST * unit:
+        right = f"shift them right by {unit.bit_length() - 1} bits, and set white to {int(white) // unit}"
+        return f"all its counts are multiples of {unit}; {right}"
+    if SHALLOWEST <= top < white and not _dark(frame) and share > max(MOST_SATURATED, 2 * below):
+        return f"its counts end at {top}, below its white of {white:g}; set white to that, or the camera to more bits"
+    return ""
+
+
+def exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
+    """One plane of a frame and its exposure [s], within its limits. DeviceError for no photograph."""
+    shortest, longest = camera.exposures
+    frame, real = camera.expose(min(max(seconds, shortest), longest))
     if frame.ndim == 3:
         frame = frame[..., plane]
     if frame.ndim != 2 or not frame.size or not np.isfinite(real) or real <= 0:
@@ -75,13 +139,15 @@ class FreshCamera:
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """As the camera's own; DeviceError for an old frame."""
         frame, real = self.camera.expose(seconds)
+        if self._latest is not None and frame.shape != self._latest.shape:
+            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._latest.shape}")
         self._latest = frame.copy()  # a driver may fill the same buffer again
         if self._before is not None and np.array_equal(frame, self._before) and not _dark(frame):
             raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
         return frame, real
 
 
-def _dark(frame: Counts) -> bool:
+def _dark(frame: Counts | Array) -> bool:
     """Whether a frame is the same nearly everywhere; hot pixels are few."""
     low, high = np.percentile(frame, (1, 99))
     return bool(low == high)
@@ -95,10 +161,12 @@ def auto_exposure(camera: Camera, plane: int) -> float:
     shortest, longest = camera.exposures
     seconds = float(np.sqrt(shortest * longest))
     for _ in range(TRIES):
-        frame, real = _exposed(camera, seconds, plane)
+        frame, real = exposed(camera, seconds, plane)
         # dark level and background; where it is not dark at all, the steps are only less exact
         dark, bright = np.percentile(frame, (1, PERCENTILE))
         fill = float((bright - dark) / max(camera.white - dark, 1))
+        if fault := miscounted(frame, camera.white):
+            raise DeviceError(f"{camera.name}: {fault}")
         if bright >= camera.white:
             step = 1 / STRONGEST_STEP if np.mean(frame >= camera.white) > 0.1 else 0.25
         else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
+from .exposure import FRAMES, late
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
@@ -17,6 +18,7 @@ UNSTEADY = 0.1  # of the change: more from frame to frame, and nothing can be me
 MARGIN = 1.5  # of the measured time
 REPEATS = 3
 FAINTEST = 0.05  # of the brighter picture: a smaller change between the two is none
+BLIND = "the picture does not change with the hologram; is this the panel that the camera sees?"
 BRIGHT = 0.9  # quantile: samples that change most tell
 
 
@@ -39,6 +41,22 @@ class Toggle:
         self.show(bright)
         self.wait(seconds)
         return self.take()
+
+
+def refuse_old(toggle: Toggle, seconds: float) -> None:
+    """DeviceError for a camera whose first picture, so long after a hologram was shown, is of the one before it."""
+    bursts = []
+    for bright in (True, False):
+        toggle.show(bright)
+        toggle.wait(seconds)
+        bursts.append([toggle.take() for _ in range(FRAMES)])
+    if (count := late(*bursts)) is None:
+        raise DeviceError(BLIND)
+    if count:
+        raise DeviceError(
+            f"frame {count + 1} after a hologram is the first that shows it; empty the camera's queue of frames before "
+            f"each, trigger each, or let the panel settle for longer than {seconds:g} s"
+        )
 
 
 def settle_time(toggle: Toggle) -> float:
@@ -77,7 +95,7 @@ def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
     telling = change >= np.quantile(change, BRIGHT)
     base = float(max(np.mean(each[telling]) for each in (bright[0], dark[0])))
     if not np.mean(change[telling]) > FAINTEST * base:
-        raise DeviceError("the picture does not change with the hologram; is this the panel that the camera sees?")
+        raise DeviceError(BLIND)
     weights = np.where(telling, bright[0] - dark[0], 0.0)
     bottom = float(np.mean([np.sum(weights * each) for each in dark]))
     top = float(np.mean([np.sum(weights * each) for each in bright]))

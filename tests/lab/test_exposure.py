@@ -71,6 +71,9 @@ def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_t
     camera.expose(1.0)
     camera.changed("third")  # black
     assert camera.expose(1.0)[0].max() == 0
+    device.expose = lambda seconds: (np.zeros((2, 1), np.uint8), seconds)
+    with pytest.raises(DeviceError, match=r"a frame of \(2, 1\) follows one of \(1, 2\)"):
+        camera.expose(1.0)
 
 
 def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its_hot_pixel():

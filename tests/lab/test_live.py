@@ -64,4 +64,4 @@ def test_a_wrong_sign_is_refused_before_anything_is_computed(table):
 def test_frames_are_refused_for_a_driver_without_sequences(table):
     folder, _, _ = table
     (folder / "bench.yaml").write_text(simulated.BENCH.replace("bits: 8,", "bits: 8, frames: 2,"))
-    assert "panel.frames is 2, but driver 'simulated' shows one pattern an exposure" in study(folder)[1]
+    assert "panel.frames is 2, but simulated panel shows one pattern an exposure" in study(folder)[1]

@@ -119,8 +119,9 @@ class MicromanagerCamera:
         real = core.getExposure() / 1000
         core.snapImage()
         frame = np.asarray(core.getImage())
+        frame = frame[..., :3].copy() if frame.ndim == 3 else frame.copy()
         check_counts(self.name, frame, self.white)
-        return frame[..., :3].copy() if frame.ndim == 3 else frame.copy(), real
+        return frame, real
 
 
 def list_installations() -> list[str]:

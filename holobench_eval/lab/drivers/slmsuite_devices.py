@@ -21,7 +21,7 @@ from annotated_types import MinLen
 from ...core.errors import UserError, suggest
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .driver import Driver, Kind, check_counts, check_levels, import_package
+from .driver import Driver, Kind, check_counts, check_levels, import_package, load
 from .worker import Worker, closed_on_failure, line
 
 Hardware = Literal["slms", "cameras"]
@@ -38,11 +38,18 @@ ELSEWHERE = {
 }
 
 
+INTERFACES: Mapping[Hardware, tuple[str, ...]] = {
+    "slms": ("name", "shape", "bitdepth", "set_phase", "close"),
+    "cameras": ("name", "bitresolution", "exposure_bounds_s", "set_exposure", "flush", "get_image", "close"),
+}
+
+
 @dataclass(frozen=True)
 class SlmsuiteSettings:
     """Which class of slmsuite, and what it is built with.
 
-    device: module and class, such as ``holoeye.Holoeye`` or ``thorlabs.ThorCam``; arguments: the class's own, such as
+    device: module and class, such as ``holoeye.Holoeye`` or ``thorlabs.ThorCam``, or another one with slmsuite's
+    interface, ``path/to/file.py:Class`` or ``module:Class``; arguments: the class's own, such as
     ``{preselect: "index:0", wav_um: 0.52}`` (slmsuite's documentation lists them).
     """
 
@@ -103,7 +110,9 @@ class SlmsuiteCamera:
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """A frame that was begun after the call, and the exposure [s] that the camera reports of it."""
-        limit = READING + 6 * seconds * self._camera.capture_attempts  # some frames are thrown away first
+        limit = READING + 6 * seconds * getattr(
+            self._camera, "capture_attempts", 5
+        )  # some frames are thrown away first
         frame, real = self._worker.call("taking a picture", limit, lambda: self._take(seconds))
         check_counts(self.name, frame, self.white, "; set its bit depth")
         return frame, real
@@ -128,16 +137,20 @@ def classes(kind: Hardware) -> list[str]:
 
 
 def _opened(kind: Hardware, make: SlmsuiteSettings | Any) -> tuple[Worker, Any]:
-    """The device and the thread that it lives on."""
-    if not isinstance(make, SlmsuiteSettings):
-        return Worker(f"slmsuite {make.name}"), make
-    maker = _find(kind, make.device)
-    worker = Worker(f"slmsuite {make.device}")
+    """The device and the thread that it lives on. UserError for one without slmsuite's interface."""
+    name = make.device if isinstance(make, SlmsuiteSettings) else type(make).__name__
+    maker = _find(kind, make.device) if isinstance(make, SlmsuiteSettings) else None
+    worker = Worker(f"slmsuite {name}")
     with closed_on_failure(lambda: worker.stop(0, lambda: None)):
-        return worker, worker.call("opening", OPENING, lambda: _build(maker, make.device, make.arguments))
+        device = worker.call("opening", OPENING, lambda: _build(maker, name, make.arguments)) if maker else make
+        if lacking := [each for each in INTERFACES[kind] if not hasattr(device, each)]:
+            raise UserError(f"device '{name}' has no '{lacking[0]}', which a {kind[:-1]} of slmsuite's has")
+        return worker, device
 
 
 def _find(kind: Hardware, device: str) -> Any:
+    if ":" in device:
+        return load(device, "device")
     module, _, name = device.partition(".")
     if device in ELSEWHERE:
         raise UserError(f"device '{device}': take {ELSEWHERE[device]}")

@@ -1,0 +1,111 @@
+"""A study through a lab's own files of a panel and a camera: each fault of them is named, and nothing is lost."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import holobench_eval as hb
+from holobench_eval.commands.own.new import write_code
+from holobench_eval.study.opening import forget_sessions
+from holobench_eval.testing import table
+from tests.lab.session.running import run, succeed
+from tests.study.studies import write_study
+
+BENCH = """\
+name: table
+version: 1
+panel: {shape: [128, 128], pitch: 6.4e-6, wavelengths: [5.17e-7], distance: 0.0118518518, bits: 8, pupil: 0.8, \
+region: 0.8}
+slm: {driver: my_panel.py:MyPanel}
+camera: {driver: my_camera.py:MyCamera, bits: 12}
+capture: {exposure: 0.03, average: 1, dark_frames: 0, dark: 65.5, settle: 0.0}
+"""
+METHODS = ("double_phase", "{name: wirtinger, params: {iterations: 5}}", "{name: online_camera, captures: 6}")
+
+
+class Frames:
+    """The simulated camera's frames, which a fault spoils from when it begins."""
+
+    def __init__(self) -> None:
+        self.grab, self.all = table.grab, list[Any]()
+        self.fault: Callable[[list[Any]], Any] = lambda frames: frames[-1]
+        self.begins: Callable[[], bool] = lambda: True
+
+    def __call__(self, seconds: float, bits: int) -> Any:
+        self.all.append(self.grab(seconds, bits))
+        return self.fault(self.all) if self.begins() else self.all[-1]
+
+
+def unplugged(_: object) -> Any:
+    raise OSError("no such\ndevice")
+
+
+@pytest.fixture
+def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Frames]:
+    """A folder with a study, a bench file and files of its devices, just as ``holoeval new`` writes them."""
+    for kind in ("camera", "panel"):
+        write_code(f"my_{kind}", tmp_path, kind)
+    (tmp_path / "bench.yaml").write_text(BENCH)
+    write_study(tmp_path / "study.yaml", *METHODS, display="{bench: bench.yaml}")
+    frames = Frames()
+    monkeypatch.setattr(table, "grab", frames)
+    forget_sessions()
+    yield frames
+    forget_sessions()
+
+
+def study(folder: Path) -> tuple[str, str]:
+    """What a run says, and the line with which it ends."""
+    return run("run", folder / "study.yaml", "--output", folder / "out")
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (unplugged, "simulated camera: taking a picture failed: OSError: no such device"),
+        (lambda frames: frames[-1][None], "gave a uint16 frame of (1, 201, 201); expected whole counts"),
+        (lambda frames: frames[-1][: 200 + len(frames) % 2], "frames differ in size: [(200, 201), (201, 201)]"),
+        (lambda frames: frames[-1].astype(float), "gave a float64 frame of (201, 201)"),
+        (lambda _: None, "gave a object frame of ()"),
+        (lambda frames: frames[-1] * 16, "counts, but 4095 are its white"),
+        (lambda frames: np.minimum(frames[-1], 255), "its counts end at 255, below its white of 4095"),
+        (lambda frames: frames[-1] & 0xFFF0, "all its counts are multiples of 16; shift them right by 4 bits, and set"),
+        (lambda frames: frames[-2:][0], "frame 2 after a change of the exposure is the first with the new one"),
+        (lambda frames: frames[-3:][0], "frame 3 after a change of the exposure is the first with the new one"),
+        (lambda frames: frames[0], "gives one and the same frame, byte for byte"),
+    ],
+)
+def test_a_camera_with_a_fault_is_named_before_anything_is_computed(frames, tmp_path, fault, said):
+    frames.fault = fault
+    assert said in study(tmp_path)[1]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_method_captures_live_and_a_camera_that_is_unplugged_costs_nothing_that_the_same_command_does_not_add(
+    frames, tmp_path
+):
+    records = tmp_path / "out" / "records"
+    frames.fault, frames.begins = unplugged, lambda: len(list(records.glob("*.json"))) > 6  # all but online_camera
+    _, failure = study(tmp_path)
+    assert "does not answer any more: simulated camera: taking a picture failed: OSError: no such device" in failure
+    kept = {path: path.read_text() for path in records.glob("*.json")}
+    assert len(kept) == 7
+    assert not any('"failed"' in text for text in kept.values())
+    frames.begins = lambda: False
+    assert not study(tmp_path)[1]
+    assert all(path.read_text() == text for path, text in kept.items())
+    scores = pd.read_csv(tmp_path / "out" / "table.csv").set_index("label")
+    assert scores.loc["online_camera", "captures"] == 1 + 6  # the first attempt's counts
+    assert scores.loc["online_camera", "psnr_linear_db"] > scores.loc["wirtinger", "psnr_linear_db"]
+
+
+def test_a_device_that_is_edited_takes_new_photographs_and_travels_with_a_session(frames, tmp_path):
+    names = [hb.study.displays.real_condition("bench.yaml", tmp_path).digest]
+    succeed("session", "export", tmp_path / "study.yaml", tmp_path / "session")
+    (tmp_path / "my_camera.py").write_text((tmp_path / "my_camera.py").read_text() + "# changed\n")
+    names += [hb.study.displays.real_condition("bench.yaml", tmp_path / each).digest for each in ("", "session")]
+    assert names[0] == names[2] != names[1]
