@@ -10,10 +10,12 @@ import pytest
 
 import holobench_eval as hb
 from holobench_eval.commands.own.new import write_code
+from holobench_eval.core.errors import UserError
+from holobench_eval.lab.bench_file import load_bench_file
 from holobench_eval.study.opening import forget_sessions
 from holobench_eval.testing import table
 from tests.lab.session.running import run, succeed
-from tests.study.studies import write_study
+from tests.study.studies import exchanged, write_study
 
 BENCH = """\
 name: table
@@ -67,10 +69,10 @@ def study(folder: Path) -> tuple[str, str]:
     ("fault", "said"),
     [
         (unplugged, "simulated camera: taking a picture failed: OSError: no such device"),
-        (lambda frames: frames[-1][None], "gave a uint16 frame of (1, 201, 201); expected whole counts"),
+        (lambda frames: frames[-1][None], "gave uint16 of (1, 201, 201); expected whole counts"),
         (lambda frames: frames[-1][: 200 + len(frames) % 2], "frames differ in size: [(200, 201), (201, 201)]"),
-        (lambda frames: frames[-1].astype(float), "gave a float64 frame of (201, 201)"),
-        (lambda _: None, "gave a object frame of ()"),
+        (lambda frames: frames[-1].astype(float), "gave float64 of (201, 201)"),
+        (lambda _: None, "gave object of ()"),
         (lambda frames: frames[-1] * 16, "counts, but 4095 are its white"),
         (lambda frames: np.minimum(frames[-1], 255), "its counts end at 255, below its white of 4095"),
         (lambda frames: frames[-1] & 0xFFF0, "all its counts are multiples of 16; shift them right by 4 bits, and set"),
@@ -104,8 +106,39 @@ def test_a_method_captures_live_and_a_camera_that_is_unplugged_costs_nothing_tha
 
 
 def test_a_device_that_is_edited_takes_new_photographs_and_travels_with_a_session(frames, tmp_path):
-    names = [hb.study.displays.real_condition("bench.yaml", tmp_path).digest]
+    names = [load_bench_file(tmp_path / "bench.yaml").digest]
     succeed("session", "export", tmp_path / "study.yaml", tmp_path / "session")
     (tmp_path / "my_camera.py").write_text((tmp_path / "my_camera.py").read_text() + "# changed\n")
-    names += [hb.study.displays.real_condition("bench.yaml", tmp_path / each).digest for each in ("", "session")]
+    names += [load_bench_file(tmp_path / each / "bench.yaml").digest for each in ("", "session")]
     assert names[0] == names[2] != names[1]
+
+
+class Wall:
+    """A panel of a notebook's own."""
+
+    shape = table.PANEL
+
+    def show(self, levels):
+        """Show levels."""
+        table.write(levels)
+
+
+class Eye:
+    """A camera of a notebook's own."""
+
+    white, exposures = 4095, (1e-5, 1.0)
+
+    def expose(self, seconds):
+        """A frame."""
+        return table.grab(seconds, 12), seconds
+
+
+def test_open_devices_take_the_place_of_those_of_a_file(frames, tmp_path, capsys):
+    (tmp_path / "bench.yaml").write_text(exchanged(BENCH, ("slm: {driver: my_panel.py:MyPanel}\n", "")))
+    display = hb.open_bench(tmp_path / "bench.yaml", slm=Wall(), camera=Eye())
+    assert "panel: slm Wall; camera: camera Eye" in capsys.readouterr().out
+    target = display.target(np.full((60, 60, 3), 0.5))
+    phase = display.solve("double_phase", target)
+    assert 0.5 < display.capture(phase, target).mean() / display.ideal(phase).mean() < 2
+    with pytest.raises(UserError, match="camera Wall: it has no 'expose'"):
+        hb.open_bench(tmp_path / "bench.yaml", slm=Wall(), camera=Wall())

@@ -106,6 +106,6 @@ def check_counts(name: str, frame: Counts, white: float, hint: str = "") -> None
         or not frame.size
     ):
         right = "whole counts, uint8 or uint16 of (H, W) or (H, W, 3)"
-        raise DeviceError(f"{name} gave a {frame.dtype} frame of {frame.shape}; expected {right}")
+        raise DeviceError(f"{name} gave {frame.dtype} of {frame.shape}; expected {right}")
     if frame.max() > white:
         raise DeviceError(f"{name} gave {frame.max()} counts, but {white:.0f} are its white{hint}")
