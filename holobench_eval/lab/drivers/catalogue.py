@@ -13,7 +13,7 @@ from ...core.plugins import made
 from ..devices import DeviceError
 from .driver import Driver, Kind
 from .own import Own, own_driver
-from .slmsuite_devices import SlmsuiteCamera, SlmsuiteSlm
+from .slmsuite_devices import theirs
 from .worker import line
 
 # a new driver is a module with ``DRIVERS``, and its name here; in the order of listings
@@ -59,10 +59,11 @@ def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
     return made(_driver(kind, driver).settings, f"{kind} driver '{driver}'", dict(params))
 
 
-def adopted(kind: Kind, device: Any) -> Any:
-    """An open device of a user's as an `Slm` or a `Camera`, which closes it. UserError: it lacks something."""
-    call, theirs, cls = ("show", "set_phase", SlmsuiteSlm) if kind == "slm" else ("expose", "get_image", SlmsuiteCamera)
-    return cls(device) if hasattr(device, theirs) and not hasattr(device, call) else Own(kind, device)
+def adopted(kind: Kind, device: Any) -> Own:
+    """An open device of a user's, or of slmsuite's. UserError: it lacks something."""
+    call, interface = ("show", "set_phase") if kind == "slm" else ("expose", "get_image")
+    is_theirs = hasattr(device, interface) and not hasattr(device, call)
+    return Own(kind, theirs(kind, device) if is_theirs else device)
 
 
 def _driver(kind: Kind, name: str) -> Driver:

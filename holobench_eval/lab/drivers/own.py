@@ -15,7 +15,8 @@ from ..devices import Counts, DeviceError
 from .driver import Driver, Kind, check_counts, check_levels, load
 from .worker import Worker, closed_on_failure
 
-OPENING, SHOWING, READING = 60.0, 20.0, 20.0  # seconds; a picture's are beyond its exposures
+OPENING, SHOWING, READING = 60.0, 20.0, 20.0  # seconds; some SDKs upload a look-up table first
+EXPOSURES = 30  # that a picture may take beyond these; some SDKs throw frames away
 
 NEEDS: Mapping[Kind, Mapping[str, str]] = {
     "slm": {"show": "show(levels)", "shape": "(rows, columns) in pixels"},
@@ -66,7 +67,7 @@ class Own:
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """See `Camera`; DeviceError for what is no photograph, and for whatever the device raises."""
-        limit = READING + 6 * seconds
+        limit = READING + EXPOSURES * seconds
         given = self._worker.call("taking a picture", limit, lambda: self._device.expose(seconds))
         if not isinstance(given, tuple) or len(given) != 2 or not isinstance(given[1], float | int | np.number):
             raise DeviceError(f"{self.name}: expose returned {type(given).__name__}; expected (counts, seconds)")
@@ -94,8 +95,13 @@ def own_driver(kind: Kind, name: str) -> Driver:
         raise UserError(f"{owner}: its parameters cannot be taken from a bench file: {error}") from error
 
     def opens(params: Any) -> Own:
-        worker = Worker(f"{kind} {cls.__name__}")
-        with closed_on_failure(lambda: worker.stop(0, lambda: None)):
-            return worker.call("opening", OPENING, lambda: Own(kind, cls(**vars(params)), worker))
+        return opened(kind, f"{kind} {cls.__name__}", lambda: cls(**vars(params)))
 
     return Driver(kind, name, settings, opens, "", "", list)
+
+
+def opened(kind: Kind, name: str, make: Callable[[], Any]) -> Own:
+    """A device that ``make`` gives, on a thread of its own. UserError and DeviceError as of `Own`."""
+    worker = Worker(name)
+    with closed_on_failure(lambda: worker.stop(0, lambda: None)):
+        return worker.call("opening", OPENING, lambda: Own(kind, make(), worker))

@@ -209,5 +209,7 @@ def test_a_class_with_slmsuites_interface_is_taken_from_a_module_a_file_and_as_a
         frame, seconds = camera.expose(0.5)
         assert (int(frame.max()), seconds) == (500, 0.5)
         camera.close()
-    with pytest.raises(UserError, match="Less' has no 'bitresolution', which a camera of slmsuite's has"):
+    with pytest.raises(
+        UserError, match="camera without the interface of slmsuite's: 'Less' object has no attribute 'close'"
+    ):
         open_device("camera", "slmsuite", {"device": f"{tmp_path}/theirs.py:Less"})
