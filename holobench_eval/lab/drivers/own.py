@@ -15,7 +15,7 @@ from ..devices import Counts, DeviceError
 from .driver import Driver, Kind, check_counts, check_levels, load
 from .worker import Worker, closed_on_failure
 
-OPENING, SHOWING, READING = 60.0, 20.0, 20.0  # seconds; some SDKs upload a look-up table first
+OPENING, SHOWING, READING = 120.0, 20.0, 20.0  # seconds; some SDKs upload a look-up table first
 EXPOSURES = 30  # that a picture may take beyond these; some SDKs throw frames away
 
 NEEDS: Mapping[Kind, Mapping[str, str]] = {
