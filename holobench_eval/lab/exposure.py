@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..imaging.warp import Array
-from .counts import step
+from .counts import step as step_of
 from .dark import Dark
 from .devices import Camera, Counts, DeviceError
 from .photograph import MOST_SATURATED
@@ -19,7 +20,7 @@ ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full st
 DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
 TRIES = 16
 STRONGEST_STEP = 32.0
-FRAMES = 4  # of a burst: so many less one may be late and are found out
+ORDER = [0, 0, 1, 1, 1, 0, 0, 0]  # of two kinds of picture
 LIT = 1.0  # seconds that show any picture
 SHALLOWEST = 15  # counts of a picture that tell how deep they are
 
@@ -46,22 +47,25 @@ def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged
     return Averaged(total / count, saturated, took / count)
 
 
-def burst(camera: Camera, seconds: float, plane: int) -> list[Array]:
-    """Some frames that follow each other, in floating point."""
-    return [exposed(camera, seconds, plane)[0].astype(float) for _ in range(FRAMES)]
+def late(take: Callable[[int], Array]) -> int | None:
+    """How many frames late a camera is, None where two kinds of picture look alike; take: the next frame, of a kind.
 
-
-def late(before: Sequence[Array], after: Sequence[Array]) -> int | None:
-    """How many frames after a change still show what was before it; None where the change is not seen.
-
-    before, after: bursts, long after the picture and the exposure of each were set.
+    The two kinds are taken in an order that no shift repeats.
     """
-    (*_, old), (*_, last, new) = before, after
-    if len(shapes := sorted({frame.shape for frame in (*before, *after)})) > 1:
+    frames = [take(kind) for kind in ORDER]
+    if len(shapes := sorted({frame.shape for frame in frames})) > 1:
         raise DeviceError(f"frames differ in size: {shapes}")
-    if not _apart(old, new) > 3 * _apart(last, new):
+    noise = float(np.median([_apart(*pair) for pair in pairwise(frames)]))
+    first, other = frames[0], max(frames, key=lambda frame: _apart(frame, frames[0]))
+    if not _apart(first, other) > 3 * noise:
         return None
-    return sum(_apart(frame, old) < _apart(frame, new) for frame in after)
+    seen = [int(_apart(frame, other) < _apart(frame, first)) for frame in frames]
+    return next(count for count in range(len(ORDER) + 1) if seen[count:] == ORDER[: len(ORDER) - count])
+
+
+def plural(count: int) -> str:
+    """``1 frame``, ``2 frames``."""
+    return f"{count} frame{'s' * (count != 1)}"
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -71,37 +75,34 @@ def _apart(one: Array, other: Array) -> float:
 def refuse_late(camera: Camera, plane: int) -> None:
     """DeviceError for a camera whose first frame after a change of the exposure is from before it, in steady light."""
     shortest, longest = camera.exposures
-    before, *others = np.geomspace(shortest, max(min(longest, LIT), shortest), 4)
-    frames = burst(camera, before, plane)
-    for seconds in others:
-        frames, earlier = burst(camera, seconds, plane), frames
-        if (count := late(earlier, frames)) is not None:
-            break
-        if np.array_equal(frames[-1], earlier[-1]) and not _dark(frames[-1]):
+    for seconds in np.geomspace(shortest, max(min(longest, LIT), shortest), 4)[1:]:
+        frames: list[Array] = []
+
+        def take(kind: int, frames: list[Array] = frames, times: Sequence[float] = (shortest, seconds)) -> Array:
+            frames.append(exposed(camera, times[kind], plane)[0].astype(np.float32))
+            return frames[-1]
+
+        count = late(take)
+        if count:
+            remedy = "empty its queue of frames before each, or trigger each"
+            raise DeviceError(f"{camera.name}: an exposure shows {plural(count)} after it was set; {remedy}")
+        if count == 0:
+            return
+        if not _dark(frames[0]) and all(np.array_equal(frames[0], frame) for frame in frames):
             raise DeviceError(
-                f"{camera.name}: gives one and the same frame, byte for byte, at exposures of {before:.2g} and "
+                f"{camera.name}: gives one and the same frame, byte for byte, at exposures of {shortest:.2g} and "
                 f"{seconds:.2g} s; does it return the last frame again, or ignore its exposure?"
             )
-    else:
-        return  # too little light to tell
-    if count:
-        raise DeviceError(
-            f"{camera.name}: frame {count + 1} after a change of the exposure is the first with the new one; empty its "
-            "queue of frames before each, or trigger each"
-        )
 
 
 def miscounted(frame: Counts, white: float) -> str:
-    """What a picture tells of wrong counts, "" for nothing: that they end below white, or are not low-justified."""
+    """What is wrong with a camera whose counts end below its white, "" where nothing is seen of that."""
     top, low = int(frame.max()), int(np.percentile(frame, 1))
     share, below = np.mean(frame == top), np.mean((frame < top) & (frame >= top - max(0.05 * (top - low), 1)))
-    unit = step(frame[frame < top])
-    if unit > 1 and top - low > SHALLOWEST * unit:
-        right = f"shift them right by {unit.bit_length() - 1} bits, and set white to {int(white) // unit}"
-        return f"all its counts are multiples of {unit}; {right}"
-    if SHALLOWEST <= top < white and not _dark(frame) and share > max(MOST_SATURATED, 2 * below):
-        return f"its counts end at {top}, below its white of {white:g}; set white to that, or the camera to more bits"
-    return ""
+    if not SHALLOWEST < top < white or _dark(frame) or share <= max(MOST_SATURATED, 2 * below):
+        return ""
+    shifted = f" (all are multiples of {unit})" if (unit := step_of(frame)) > 1 else ""
+    return f"its counts end at {top}{shifted}, below its white of {white:g}; set its white to that, or its bits"
 
 
 def exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:

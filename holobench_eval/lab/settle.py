@@ -9,7 +9,7 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
-from .exposure import FRAMES, late
+from .exposure import late, plural
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
@@ -45,17 +45,21 @@ class Toggle:
 
 def refuse_old(toggle: Toggle, seconds: float) -> None:
     """DeviceError for a camera whose first picture, so long after a hologram was shown, is of the one before it."""
-    bursts = []
-    for bright in (True, False):
-        toggle.show(bright)
-        toggle.wait(seconds)
-        bursts.append([toggle.take() for _ in range(FRAMES)])
-    if (count := late(*bursts)) is None:
+    shown: list[int] = []
+
+    def take(kind: int) -> Array:
+        if shown[-1:] != [kind]:
+            toggle.show(kind == 0)
+            toggle.wait(seconds)
+        shown.append(kind)
+        return toggle.take()
+
+    if (count := late(take)) is None:
         raise DeviceError(BLIND)
     if count:
         raise DeviceError(
-            f"frame {count + 1} after a hologram is the first that shows it; empty the camera's queue of frames before "
-            f"each, trigger each, or let the panel settle for longer than {seconds:g} s"
+            f"a hologram shows {plural(count)} after {seconds:g} s to settle; empty the camera's queue of frames before "
+            "each, trigger each, or let the panel settle for longer"
         )
 
 

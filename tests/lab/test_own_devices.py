@@ -75,9 +75,12 @@ def study(folder: Path) -> tuple[str, str]:
         (lambda _: None, "gave object of ()"),
         (lambda frames: frames[-1] * 16, "counts, but 4095 are its white"),
         (lambda frames: np.minimum(frames[-1], 255), "its counts end at 255, below its white of 4095"),
-        (lambda frames: frames[-1] & 0xFFF0, "all its counts are multiples of 16; shift them right by 4 bits, and set"),
-        (lambda frames: frames[-2:][0], "frame 2 after a change of the exposure is the first with the new one"),
-        (lambda frames: frames[-3:][0], "frame 3 after a change of the exposure is the first with the new one"),
+        (
+            lambda frames: frames[-1] & 0xFFF0,
+            "its counts end at 4080 (all are multiples of 16), below its white of 4095",
+        ),
+        (lambda frames: frames[-2:][0], "an exposure shows 1 frame after it was set"),
+        (lambda frames: frames[-5:][0], "an exposure shows 4 frames after it was set"),
         (lambda frames: frames[0], "gives one and the same frame, byte for byte"),
     ],
 )
