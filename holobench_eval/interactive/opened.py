@@ -272,7 +272,8 @@ def open_bench(
         Where methods compute, see ``open_display``.
     slm, camera
         Open devices in the place of the file's, each with what ``Slm`` or ``Camera`` of holobench_eval/lab/devices.py
-        needs, or of slmsuite. They are closed when the program ends.
+        needs, or of slmsuite. Each is called on a thread of its own, and closed when
+        the program ends.
 
     Returns
     -------
@@ -287,7 +288,8 @@ def open_bench(
         A check failed, or the camera cannot be registered.
     """
     path = path_of(file, "file")
-    panel, sensor = slm and adopted("slm", slm), camera and adopted("camera", camera)
+    panel = None if slm is None else adopted("slm", slm)
+    sensor = None if camera is None else adopted("camera", camera)
     bench = real_condition(path.name, path.parent, panel, sensor)
     return OpenDisplay(bench, whole(seed, "seed"), path.parent, find(device))
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, MaxLen, MinLen
 
 from ..core.errors import CellError, UserError
+from ..core.hashing import file_state
 from ..core.plugins import is_file
 from ..core.schema import FieldError, typed
 from ..core.yaml_source import load
@@ -118,9 +119,9 @@ def load_bench_file(path: Path) -> BenchFile:
     except CellError as error:
         raise document.error(("phase", "correction"), f"phase: {error}") from error
     correction = (path.parent / phase.correction.file).read_bytes() if phase.correction else b""
-    for file in (code := device_files(bench, path.parent)).values():
-        if not file.is_file():
-            raise UserError(f"{path}: {file}: no such file; expected that of a device's class")
+    for key, file in (code := device_files(bench, path.parent)).items():
+        if file_state(file) is None:
+            raise document.error(tuple(key.split(".")), f"{file}: no such file; expected that of a device's class")
     slm, camera = (
         {key: located(value, path.parent) if isinstance(value, str) else value for key, value in given.items()}
         for given in (bench.slm, bench.camera)

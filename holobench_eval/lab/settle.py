@@ -58,8 +58,8 @@ def refuse_old(toggle: Toggle, seconds: float) -> None:
         raise DeviceError(BLIND)
     if count:
         raise DeviceError(
-            f"a hologram shows {plural(count)} after {seconds:g} s to settle; empty the camera's queue of frames before "
-            "each, trigger each, or let the panel settle for longer"
+            f"a hologram shows {plural(count)} after {seconds:g} s to settle; empty the camera's queue of frames, "
+            "trigger each, or let the panel settle for longer"
         )
 
 
