@@ -63,11 +63,6 @@ def late(take: Callable[[int], Array]) -> int | None:
     return next(count for count in range(len(ORDER) + 1) if seen[count:] == ORDER[: len(ORDER) - count])
 
 
-def plural(count: int) -> str:
-    """``1 frame``, ``2 frames``."""
-    return f"{count} frame{'s' * (count != 1)}"
-
-
 def _apart(one: Array, other: Array) -> float:
     return float(np.sqrt(np.mean((one - other) ** 2)))
 
@@ -85,7 +80,9 @@ def refuse_late(camera: Camera, plane: int) -> None:
         count = late(take)
         if count:
             remedy = "empty its queue of frames before each, or trigger each"
-            raise DeviceError(f"{camera.name}: an exposure shows {plural(count)} after it was set; {remedy}")
+            raise DeviceError(
+                f"{camera.name}: frame {count + 1} after an exposure was set is the first with it; {remedy}"
+            )
         if count == 0:
             return
         if not _dark(frames[0]) and all(np.array_equal(frames[0], frame) for frame in frames):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
-from .exposure import late, plural
+from .exposure import late
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
@@ -58,7 +58,7 @@ def refuse_old(toggle: Toggle, seconds: float) -> None:
         raise DeviceError(BLIND)
     if count:
         raise DeviceError(
-            f"a hologram shows {plural(count)} after {seconds:g} s to settle; empty the camera's queue of frames, "
+            f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue of frames, "
             "trigger each, or let the panel settle for longer"
         )
 

@@ -73,8 +73,8 @@ def study(folder: Path) -> tuple[str, str]:
             lambda frames: frames[-1] & 0xFFF0,
             "its counts end at 4080 (all are multiples of 16), below its white of 4095",
         ),
-        (lambda frames: frames[-2:][0], "an exposure shows 1 frame after it was set"),
-        (lambda frames: frames[-5:][0], "an exposure shows 4 frames after it was set"),
+        (lambda frames: frames[-2:][0], "frame 2 after an exposure was set is the first with it"),
+        (lambda frames: frames[-5:][0], "frame 5 after an exposure was set is the first with it"),
         (lambda frames: frames[0], "gives one and the same frame, byte for byte"),
     ],
 )

@@ -52,7 +52,7 @@ def test_pictures_are_described(devices: list[str], monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        (lambda frames: frames[-2:][0], "an exposure shows 1 frame after it was set"),
+        (lambda frames: frames[-2:][0], "frame 2 after an exposure was set is the first with it"),
         (lambda frames: frames[0], "one and the same frame, byte for byte"),
         (lambda frames: frames[-1] // 16, "its counts end at 255, below its white of 4095"),
         (lambda frames: frames[-1] & 0xFFF0, "its counts end at 4080 (all are multiples of 16), below"),
@@ -90,7 +90,7 @@ def test_a_camera_that_holds_the_last_picture_back_is_found_out_with_a_panel(dev
     text, well = said(devices)
     assert not well
     assert text.endswith("let the panel settle for longer")
-    assert "a hologram shows 1 frame after 1.5 s to settle" in text
+    assert "frame 2 after 1.5 s to settle is the first of a hologram" in text
 
 
 def test_the_command_takes_files_and_a_bench_file_and_fails_with_a_fault(devices, tmp_path, monkeypatch):

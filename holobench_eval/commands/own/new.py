@@ -37,7 +37,7 @@ def new(
     camera: Annotated[bool, typer.Option("--camera", help="A method that captures its own holograms.")] = False,
     trains: Annotated[bool, typer.Option("--trains", help="A method that learns from captures first.")] = False,
 ) -> None:
-    """Write a method, camera or panel that works, to be changed, and its test; or a display, every key explained."""
+    """Write a method, display, camera or panel, to be changed: code that works and its test, or every key explained."""
     if camera + trains > (kind == "method"):
         raise UserError("--camera and --trains: each writes another method; choose one of them, of a method alone")
     if kind == "display":
