@@ -58,8 +58,8 @@ def refuse_old(toggle: Toggle, seconds: float) -> None:
         raise DeviceError(BLIND)
     if count:
         raise DeviceError(
-            f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue of frames, "
-            "trigger each, or let the panel settle for longer"
+            f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue "
+            "of frames, trigger each, or let the panel settle for longer"
         )
 
 
