@@ -90,6 +90,6 @@ for axis, (title, picture) in zip(axes, pictures.items(), strict=True):
 # Saved as ``backprojection.py``, the class is named in a config as
 # ``backprojection.py:Backprojection``, beside the shipped methods, and a study
 # scores it on many targets with intervals and tests. One target shows nothing.
-# ``holoeval new-method mine`` writes such a file, and a test of what every method
+# ``holoeval new method mine`` writes such a file, and a test of what every method
 # promises; with ``--camera`` one that captures while it solves, with ``--trains``
 # one that learns first, as the next two examples show.

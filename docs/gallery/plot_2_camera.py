@@ -21,11 +21,11 @@ folder = Path(tempfile.mkdtemp())
 # The method
 # ----------
 #
-# ``holoeval new-method closer --camera`` writes one that works, to be changed, and
+# ``holoeval new method closer --camera`` writes one that works, to be changed, and
 # its test:
 
 with chdir(folder):
-    app(["new-method", "closer", "--camera"], standalone_mode=False)
+    app(["new", "method", "closer", "--camera"], standalone_mode=False)
 print((folder / "closer.py").read_text())
 
 # %%

@@ -20,11 +20,11 @@ folder = Path(tempfile.mkdtemp())
 # The method
 # ----------
 #
-# ``holoeval new-method flatter --trains`` writes one that works, to be changed, and
+# ``holoeval new method flatter --trains`` writes one that works, to be changed, and
 # its test:
 
 with chdir(folder):
-    app(["new-method", "flatter", "--trains"], standalone_mode=False)
+    app(["new", "method", "flatter", "--trains"], standalone_mode=False)
 print((folder / "flatter.py").read_text())
 
 # %%

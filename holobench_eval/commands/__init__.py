@@ -33,9 +33,8 @@ COMMANDS = {
     ),
     "Finished reports": ("reports.figure", "reports.check", "reports.compare", "reports.site"),
     "Pictures and real displays": ("doctor", "score", "session", "twin"),
-    "Your own methods and displays, and this program": (
-        "own.new_method",
-        "own.new_display",
+    "Your own methods, displays and devices, and this program": (
+        "own.new",
         "own.conformance",
         "own.calibrate",
     ),
@@ -51,6 +50,8 @@ class _ByPurpose(TyperGroup):
     """A help that lists the commands as ``COMMANDS`` does, a line each."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] in ("new-method", "new-display"):  # as it was called once
+            args = ["new", args[0].removeprefix("new-"), *args[1:]]
         return super().parse_args(ctx, ["--version"] if "--version" in args else args)  # after a command, too
 
     def list_commands(self, ctx: Any) -> list[str]:

@@ -1,4 +1,5 @@
-"""``holoeval doctor``: what is installed, which displays and cameras answer, and what to do about what is missing.
+"""``holoeval doctor``: what is installed, which displays and cameras answer, and what to do about what is missing; or
+what the pictures of a device look like.
 
 Imports and drivers run native code of others, so they run in a process of their own with a time limit: a library that
 crashes or hangs is a finding.
@@ -18,7 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import requires, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.markup import escape
@@ -85,8 +86,17 @@ class Finding:
     remedy: str = ""
 
 
-def doctor() -> None:
+def doctor(
+    devices: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="A camera, a panel, path/to/file.py:Class, or both; or a bench file: look at their pictures."
+        ),
+    ] = None,
+) -> None:
     """List what is installed and which devices answer: packages, panels, cameras, and what to do about the rest."""
+    if devices:
+        _try(devices)
     screen, findings = console(), examine()
     table = Table(title="holoeval doctor", title_justify="left")
     for heading in ("", "", "found"):
@@ -101,6 +111,17 @@ def doctor() -> None:
     for line in (*remedies, last):  # never wrapped, so that commands can be copied
         screen.print(line, soft_wrap=True, markup=False)
     raise typer.Exit(1 if broken else 0)
+
+
+def _try(devices: list[str]) -> NoReturn:
+    """Look at what devices give, a line each."""
+    from ..lab.trial import tried
+
+    screen, faults = console(), 0
+    for check in tried(devices):
+        faults += not check.passed
+        screen.print(f"{'' if check.passed else 'fault: '}{check.line}", soft_wrap=True, markup=False)
+    raise typer.Exit(1 if faults else 0)
 
 
 def examine() -> list[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, make_dataclass, replace
+from dataclasses import field, fields, is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -144,15 +144,8 @@ def _is_function(kind: Kind, found: Any) -> bool:
 def _class_of(function: Callable[..., Any], owner: str) -> type[Any]:
     """The dataclass of a method that is a function of target and bench. Its further parameters are the fields; what is
     set on the function, such as ``camera = True``, is declared by the class, functions as static methods."""
-    _, _, *further = inspect.signature(function).parameters.values()
-    for given in further:
-        if given.kind in (given.VAR_POSITIONAL, given.VAR_KEYWORD):
-            raise UserError(f"{owner}: '{given}' takes any parameters; name each of them")
-        if given.annotation is given.empty and given.default is given.empty:
-            raise UserError(f"{owner}: parameter '{given.name}' needs an annotation or a default")
     try:
-        hints = get_type_hints(function, include_extras=True)
-        fields = [(given.name, hints.get(given.name, type(given.default)), given.default) for given in further]
+        fields = fields_of(function, owner, 2)
 
         @wraps(function)
         def solve(self: Any, target: Any, bench: Any) -> Any:
@@ -165,6 +158,26 @@ def _class_of(function: Callable[..., Any], owner: str) -> type[Any]:
         raise UserError(f"{owner}: its parameters cannot be taken from a config: {error}") from error
     cls.__module__, cls.__qualname__ = function.__module__, function.__qualname__
     return cls
+
+
+def fields_of(function: Callable[..., Any], owner: str, skipped: int = 0) -> list[tuple[str, Any, Any]]:
+    """The parameters of a function or a class as fields of a dataclass, but for the first ones that are skipped.
+
+    UserError for one that no file can give; NameError or TypeError where its annotation cannot be evaluated.
+    """
+    further = list(inspect.signature(function).parameters.values())[skipped:]
+    for given in further:
+        if given.kind in (given.VAR_POSITIONAL, given.VAR_KEYWORD):
+            raise UserError(f"{owner}: '{given}' takes any parameters; name each of them")
+        if given.annotation is given.empty and given.default is given.empty:
+            raise UserError(f"{owner}: parameter '{given.name}' needs an annotation or a default")
+    own: Any = vars(function).get("__init__", function) if isinstance(function, type) else function
+    hints = get_type_hints(own, include_extras=True)
+    defaults = [field() if each.default is each.empty else field(default=each.default) for each in further]
+    return [
+        (each.name, hints.get(each.name, type(each.default)), default)
+        for each, default in zip(further, defaults, strict=True)
+    ]
 
 
 @cache

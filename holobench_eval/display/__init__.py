@@ -5,7 +5,7 @@ from .calibrated import CalibratedBench
 from .metered import MeteredDisplay
 from .simulated.profile import Profile, load_profile
 
-MeteredBench = MeteredDisplay  # the name that `holoeval new-method` used to write
+MeteredBench = MeteredDisplay  # the name that `holoeval new` once used to write
 
 __all__ = [
     "CalibratedBench",

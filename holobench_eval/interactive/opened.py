@@ -23,6 +23,7 @@ from ..display.api import DisplaySpec
 from ..display.nominal import ideal_image, nominal_levels
 from ..display.phases import check_phase, from_numpy, is_plain, phase_doubt, single, type_name
 from ..display.traits import refuse_plane, traits_of
+from ..lab.drivers.catalogue import adopted
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
 from .described import CAPTURE, IDEAL, PHASE, TARGET, Array, Described, described
@@ -256,7 +257,9 @@ def open_display(
     return OpenDisplay(condition(str(name), rows_and_columns(panel), start), whole(seed, "seed"), start, find(device))
 
 
-def open_bench(file: str | Path, seed: int = 0, device: str = "cpu") -> OpenDisplay:
+def open_bench(
+    file: str | Path, seed: int = 0, device: str = "cpu", slm: Any = None, camera: Any = None
+) -> OpenDisplay:
     """Open the devices of a real bench, check them, and register its camera.
 
     Parameters
@@ -267,6 +270,10 @@ def open_bench(file: str | Path, seed: int = 0, device: str = "cpu") -> OpenDisp
         Of all random numbers.
     device
         Where methods compute, see ``open_display``.
+    slm, camera
+        Open devices in the place of the file's, each with what ``Slm`` or ``Camera`` of holobench_eval/lab/devices.py
+        needs, or of slmsuite. Each is called on a thread of its own, and closed when
+        the program ends.
 
     Returns
     -------
@@ -281,7 +288,10 @@ def open_bench(file: str | Path, seed: int = 0, device: str = "cpu") -> OpenDisp
         A check failed, or the camera cannot be registered.
     """
     path = path_of(file, "file")
-    return OpenDisplay(real_condition(path.name, path.parent), whole(seed, "seed"), path.parent, find(device))
+    panel = None if slm is None else adopted("slm", slm)
+    sensor = None if camera is None else adopted("camera", camera)
+    bench = real_condition(path.name, path.parent, panel, sensor)
+    return OpenDisplay(bench, whole(seed, "seed"), path.parent, find(device))
 
 
 def _name(target: Tensor) -> str:

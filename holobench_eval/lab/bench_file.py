@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal
 from annotated_types import Interval, MaxLen, MinLen
 
 from ..core.errors import CellError, UserError
+from ..core.hashing import file_state
+from ..core.plugins import is_file
 from ..core.schema import FieldError, typed
 from ..core.yaml_source import load
 from ..display.simulated.profile import SMALLEST_PANEL
@@ -18,6 +20,7 @@ from ..display.simulated.stages import Panel
 from ..imaging.convention import Convention
 from ..methods.files.correction import on_panel
 from .dark import given_dark
+from .drivers.driver import located
 from .laser import LaserSettings
 
 LONGEST = 600.0  # seconds
@@ -116,4 +119,20 @@ def load_bench_file(path: Path) -> BenchFile:
     except CellError as error:
         raise document.error(("phase", "correction"), f"phase: {error}") from error
     correction = (path.parent / phase.correction.file).read_bytes() if phase.correction else b""
-    return replace(bench, phase=phase, capture=capture, digest=hashlib.sha256(told.encode() + correction).hexdigest())
+    for key, file in (code := device_files(bench, path.parent)).items():
+        if file_state(file) is None:
+            raise document.error(tuple(key.split(".")), f"{file}: no such file; expected that of a device's class")
+    slm, camera = (
+        {key: located(value, path.parent) if isinstance(value, str) else value for key, value in given.items()}
+        for given in (bench.slm, bench.camera)
+    )
+    files = correction + b"".join(file.read_bytes() for file in code.values())
+    digest = hashlib.sha256(told.encode() + files).hexdigest()
+    return replace(bench, phase=phase, capture=capture, slm=slm, camera=camera, digest=digest)
+
+
+def device_files(bench: BenchFile, folder: Path) -> dict[str, Path]:
+    """The files of a lab's own devices, by the keys that name them; relative paths start in the folder."""
+    kinds = (("slm", bench.slm), ("camera", bench.camera))
+    names = {f"{kind}.{key}": str(given.get(key)) for kind, given in kinds for key in ("driver", "device")}
+    return {key: folder / name.rpartition(":")[0] for key, name in names.items() if is_file(name)}

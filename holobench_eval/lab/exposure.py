@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..imaging.warp import Array
+from .counts import step as step_of
 from .dark import Dark
 from .devices import Camera, Counts, DeviceError
+from .photograph import MOST_SATURATED
 
 FILL, PERCENTILE = 0.7, 99.9  # where auto exposure puts which samples, as a part of the range from dark to white
 ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full stops
 DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
 TRIES = 16
 STRONGEST_STEP = 32.0
+ORDER = [0, 0, 1, 1, 1, 0, 0, 0]  # of two kinds of picture
+LIT = 1.0  # seconds that show any picture
+SHALLOWEST = 15  # counts of a picture that tell how deep they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,20 +36,76 @@ class Averaged:
 
 def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged:
     """Mean of ``count`` frames; plane: the one that is taken of a colour camera's. DeviceError for no good frame."""
-    shortest, longest = camera.exposures
     total: Array = np.zeros(())
     saturated: NDArray[np.bool_] = np.zeros((), dtype=bool)
     took = 0.0
     for _ in range(count):
-        frame, real = _exposed(camera, min(max(seconds, shortest), longest), plane)
+        frame, real = exposed(camera, seconds, plane)
         if total.ndim and total.shape != frame.shape:
             raise DeviceError(f"{camera.name}: a frame of {frame.shape} follows one of {total.shape}")
         total, saturated, took = total + frame, saturated | (frame >= camera.white), took + real
     return Averaged(total / count, saturated, took / count)
 
 
-def _exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
-    frame, real = camera.expose(seconds)
+def late(take: Callable[[int], Array]) -> int | None:
+    """How many frames late a camera is, None where two kinds of picture look alike; take: the next frame, of a kind.
+
+    The two kinds are taken in an order that no shift repeats.
+    """
+    frames = [take(kind) for kind in ORDER]
+    if len(shapes := sorted({frame.shape for frame in frames})) > 1:
+        raise DeviceError(f"frames differ in size: {shapes}")
+    noise = float(np.median([_apart(*pair) for pair in pairwise(frames)]))
+    first, other = frames[0], max(frames, key=lambda frame: _apart(frame, frames[0]))
+    if not _apart(first, other) > 3 * noise:
+        return None
+    seen = [int(_apart(frame, other) < _apart(frame, first)) for frame in frames]
+    return next(count for count in range(len(ORDER) + 1) if seen[count:] == ORDER[: len(ORDER) - count])
+
+
+def _apart(one: Array, other: Array) -> float:
+    return float(np.sqrt(np.mean((one - other) ** 2)))
+
+
+def refuse_late(camera: Camera, plane: int) -> None:
+    """DeviceError for a camera whose first frame after a change of the exposure is from before it, in steady light."""
+    shortest, longest = camera.exposures
+    for seconds in np.geomspace(shortest, max(min(longest, LIT), shortest), 4)[1:]:
+        frames: list[Array] = []
+
+        def take(kind: int, frames: list[Array] = frames, times: Sequence[float] = (shortest, seconds)) -> Array:
+            frames.append(exposed(camera, times[kind], plane)[0].astype(np.float32))
+            return frames[-1]
+
+        count = late(take)
+        if count:
+            remedy = "empty its queue of frames before each, or trigger each"
+            raise DeviceError(
+                f"{camera.name}: frame {count + 1} after an exposure was set is the first with it; {remedy}"
+            )
+        if count == 0:
+            return
+        if not _dark(frames[0]) and all(np.array_equal(frames[0], frame) for frame in frames):
+            raise DeviceError(
+                f"{camera.name}: gives one and the same frame, byte for byte, at exposures of {shortest:.2g} and "
+                f"{seconds:.2g} s; does it return the last frame again, or ignore its exposure?"
+            )
+
+
+def miscounted(frame: Counts, white: float) -> str:
+    """What is wrong with a camera whose counts end below its white, "" where nothing is seen of that."""
+    top, low = int(frame.max()), int(np.percentile(frame, 1))
+    share, below = np.mean(frame == top), np.mean((frame < top) & (frame >= top - max(0.05 * (top - low), 1)))
+    if not SHALLOWEST < top < white or _dark(frame) or share <= max(MOST_SATURATED, 2 * below):
+        return ""
+    shifted = f" (all are multiples of {unit})" if (unit := step_of(frame)) > 1 else ""
+    return f"its counts end at {top}{shifted}, below its white of {white:g}; set its white to that, or its bits"
+
+
+def exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
+    """One plane of a frame and its exposure [s], within its limits. DeviceError for no photograph."""
+    shortest, longest = camera.exposures
+    frame, real = camera.expose(min(max(seconds, shortest), longest))
     if frame.ndim == 3:
         frame = frame[..., plane]
     if frame.ndim != 2 or not frame.size or not np.isfinite(real) or real <= 0:
@@ -75,13 +137,15 @@ class FreshCamera:
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """As the camera's own; DeviceError for an old frame."""
         frame, real = self.camera.expose(seconds)
+        if self._latest is not None and frame.shape != self._latest.shape:
+            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._latest.shape}")
         self._latest = frame.copy()  # a driver may fill the same buffer again
         if self._before is not None and np.array_equal(frame, self._before) and not _dark(frame):
             raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
         return frame, real
 
 
-def _dark(frame: Counts) -> bool:
+def _dark(frame: Counts | Array) -> bool:
     """Whether a frame is the same nearly everywhere; hot pixels are few."""
     low, high = np.percentile(frame, (1, 99))
     return bool(low == high)
@@ -95,10 +159,12 @@ def auto_exposure(camera: Camera, plane: int) -> float:
     shortest, longest = camera.exposures
     seconds = float(np.sqrt(shortest * longest))
     for _ in range(TRIES):
-        frame, real = _exposed(camera, seconds, plane)
+        frame, real = exposed(camera, seconds, plane)
         # dark level and background; where it is not dark at all, the steps are only less exact
         dark, bright = np.percentile(frame, (1, PERCENTILE))
         fill = float((bright - dark) / max(camera.white - dark, 1))
+        if fault := miscounted(frame, camera.white):
+            raise DeviceError(f"{camera.name}: {fault}")
         if bright >= camera.white:
             step = 1 / STRONGEST_STEP if np.mean(frame >= camera.white) > 0.1 else 0.25
         else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,8 +12,8 @@ from typing import Annotated, Protocol
 from annotated_types import Interval
 
 from ..core.errors import UserError
-from ..core.sources import import_file
 from .devices import DeviceError
+from .drivers.driver import load, located
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def laser(settings: LaserSettings | None, channels: int, folder: Path, ask: Call
     if bool(settings.command) == bool(settings.callable):
         raise UserError("laser: give either 'command' or 'callable'")
     if settings.callable:
-        return SwitchedLaser(settings.callable, _function(settings.callable, folder))
+        return SwitchedLaser(settings.callable, load(located(settings.callable, folder), "laser.callable"))
     if not any("{channel}" in part for part in settings.command):
         raise UserError("laser.command: one argument must hold {channel}, which stands for 0, 1, 2 or off")
     return SwitchedLaser(settings.command[0], partial(_run, settings.command, settings.timeout, folder))
@@ -119,17 +118,3 @@ def _run(command: Sequence[str], timeout: float, folder: Path, channel: int | No
     if done.returncode:
         answer = (done.stderr.strip() or done.stdout.strip() or "without a word").splitlines()[-1]
         raise DeviceError(f"laser: '{program}' ended with {done.returncode} for channel {word}: {answer[:200]}")
-
-
-def _function(name: str, folder: Path) -> Callable[[int | None], object]:
-    source, _, attribute = name.rpartition(":")
-    if not source:
-        raise UserError(f"laser.callable '{name}' should be path/to/file.py:function or module:function")
-    try:
-        module = import_file(folder / source) if source.endswith(".py") else importlib.import_module(source)
-    except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
-        raise UserError(f"laser.callable '{name}' cannot be imported: {type(error).__name__}: {error}") from error
-    function: Callable[[int | None], object] | None = getattr(module, attribute, None)
-    if not callable(function):
-        raise UserError(f"laser.callable '{name}': there is no function '{attribute}' in {source}")
-    return function

@@ -23,14 +23,14 @@ from .test_pattern import draw_pattern
 SOLVER = Wirtinger(iterations=30, initial_phase="random")
 
 
-def open_live(bench: BenchFile, folder: Path, seed: int) -> RealBench:
+def open_live(bench: BenchFile, folder: Path, seed: int, slm: Slm | None, camera: Camera | None) -> RealBench:
     """The bench, checked; its devices are given back when the program ends. UserError in one line for what is wrong.
 
-    folder: where relative paths of the bench file start.
+    folder: where relative paths of the bench file start; slm, camera: in the place of those of the file.
     """
     spec = bench.panel.spec(bench.name)
     lasers = laser(bench.laser, len(spec.wavelengths), folder, _ask)
-    slm, camera = _devices(bench)
+    slm, camera = _devices(bench, slm, camera)
     rig = Rig(slm, camera, bench.phase, bench.capture, spec.wavelengths, lasers)
     atexit.register(rig.close)
     print(f"panel: {slm.name}; camera: {camera.name}")
@@ -48,21 +48,22 @@ def letter(bench: RealBench) -> Request:
     return Request(bench.shown(phase), bench.relative_exposure(target), "letter", ())
 
 
-def _devices(bench: BenchFile) -> tuple[Slm, Camera]:
-    panel, camera = _driver("slm", bench.slm), _driver("camera", bench.camera)
-    checked_params("camera", *camera)  # before a panel is opened for nothing
+def _devices(bench: BenchFile, slm: Slm | None, camera: Camera | None) -> tuple[Slm, Camera]:
+    panel, sensor = slm or _driver("slm", bench.slm), camera or _driver("camera", bench.camera)
+    if isinstance(sensor, tuple):
+        checked_params("camera", *sensor)  # before a panel is opened for nothing
     try:
-        slm: Slm = open_device("slm", *panel)
+        slm = open_device("slm", *panel) if isinstance(panel, tuple) else panel
         with closed_on_failure(slm.close):
             if slm.shape != bench.panel.shape:
                 shape = list(bench.panel.shape)
                 raise UserError(f"panel.shape is {shape}, but {slm.name} has {list(slm.shape)} pixels")
             if bench.panel.frames > 1 and not isinstance(slm, SequenceSlm):
                 raise UserError(
-                    f"panel.frames is {bench.panel.frames}, but driver '{panel[0]}' shows one pattern an exposure; "
+                    f"panel.frames is {bench.panel.frames}, but {slm.name} shows one pattern an exposure; "
                     "leave it out, give the driver show_sequence, or exchange files (holoeval session)"
                 )
-            return slm, open_device("camera", *camera)
+            return slm, open_device("camera", *sensor) if isinstance(sensor, tuple) else sensor
     except DeviceError as error:
         raise UserError(f"bench '{bench.name}': {error}") from error
 

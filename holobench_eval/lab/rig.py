@@ -17,13 +17,14 @@ from ..imaging.convention import Convention
 from .bench_file import CaptureSettings
 from .dark import Dark, given_dark
 from .devices import Camera, DeviceError, SequenceSlm, Slm
-from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames
+from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames, exposed, miscounted, refuse_late
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
-from .settle import PATIENCE, Toggle, settle_time
+from .settle import PATIENCE, Toggle, refuse_old, settle_time
 
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
+FAR = 8.0  # times an exposure: bright samples are saturated
 TRIES = 2  # of every photograph, since drivers drop a frame now and then
 
 
@@ -73,7 +74,7 @@ class Rig:
 
         The camera's limits cut exposures off, which changes noise and saturation but not the light, in counts per
         second. CellError for a phase that the panel cannot show, and where a device fails twice; `LostDeviceError`
-        where that happens to two photographs in a row.
+        where that happens to two photographs in a row, or the camera gives no frame at all.
         """
         ready = self.prepared
         if ready is None:
@@ -83,11 +84,20 @@ class Rig:
             taken = _patiently(lambda: self._take(request, self.convention, ready, self.settings))
         except DeviceError as error:
             self._failures += 1
-            if self._failures >= 2:
-                raise LostDeviceError(f"the bench does not answer any more: {error}; mend it and resume") from error
+            if self._failures >= 2 or not self._answers():
+                raise LostDeviceError(
+                    f"the bench does not answer any more: {error}; mend it, and run again with --retry-failed"
+                ) from error
             raise CellError(f"no photograph: {error}") from error
         self._failures = 0
         return taken
+
+    def _answers(self) -> bool:
+        """Whether the camera still gives a frame."""
+        with suppress(DeviceError):
+            self.camera.expose(self.camera.exposures[0])
+            return True
+        return False
 
     def prepare(self, pattern: Request, say: Callable[[str], None]) -> Prepared:
         """Exposure, settling time, dark frames, linearity, phase convention, in this order, one line each.
@@ -98,6 +108,8 @@ class Rig:
         """
         self._check_phase(pattern.phase)
         try:
+            self._show(pattern.phase, 0, self.convention, self._longest)
+            refuse_late(self.camera, self.planes[0])
             exposures = tuple(self._exposure(pattern, channel) for channel in range(len(self.planes)))
             say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
             settle = self._settle(pattern.phase, exposures[0] * pattern.relative_exposure)
@@ -132,9 +144,12 @@ class Rig:
         self._show(pattern.phase, channel, self.convention, PATIENCE)
         return auto_exposure(self.camera, self.planes[channel]) / pattern.relative_exposure
 
+    @property
+    def _longest(self) -> float:
+        """Seconds after which everything has settled."""
+        return PATIENCE if self.settings.settle == "auto" else self.settings.settle
+
     def _settle(self, phase: Tensor, seconds: float) -> float:
-        if self.settings.settle != "auto":
-            return self.settings.settle
         self.laser.select(0)
         bright, dark = (self.convention.of(0).levels(each) for each in (phase[0], torch.zeros_like(phase[0])))
         toggle = Toggle(
@@ -142,7 +157,8 @@ class Rig:
             take=lambda: averaged(self.camera, seconds, 1, self.planes[0]).counts,
             wait=self.wait,
         )
-        return settle_time(toggle)
+        refuse_old(toggle, self._longest)
+        return settle_time(toggle) if self.settings.settle == "auto" else self._longest
 
     def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
         if self.settings.dark is not None:
@@ -160,6 +176,8 @@ class Rig:
         for channel, (seconds, dark, plane) in enumerate(zip(ready.exposures, ready.darks, self.planes, strict=True)):
             self._show(pattern.phase, channel, self.convention, ready.settle)
             take = partial(averaged, self.camera, count=self.settings.average, plane=plane)
+            if fault := miscounted(exposed(self.camera, FAR * seconds, plane)[0], self.camera.white):
+                yield Check(False, f"{self.camera.name}: {fault}")
             check = linearity(take, seconds * pattern.relative_exposure, dark)
             yield replace(check, line=f"channel {channel}: {check.line}") if len(self.planes) > 1 else check
         single = replace(self.settings, average=1, hdr=(1.0,))  # many photographs, of which none is scored

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
+from .exposure import late
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
@@ -17,6 +18,7 @@ UNSTEADY = 0.1  # of the change: more from frame to frame, and nothing can be me
 MARGIN = 1.5  # of the measured time
 REPEATS = 3
 FAINTEST = 0.05  # of the brighter picture: a smaller change between the two is none
+BLIND = "the picture does not change with the hologram; is this the panel that the camera sees?"
 BRIGHT = 0.9  # quantile: samples that change most tell
 
 
@@ -39,6 +41,26 @@ class Toggle:
         self.show(bright)
         self.wait(seconds)
         return self.take()
+
+
+def refuse_old(toggle: Toggle, seconds: float) -> None:
+    """DeviceError for a camera whose first picture, so long after a hologram was shown, is of the one before it."""
+    shown: list[int] = []
+
+    def take(kind: int) -> Array:
+        if shown[-1:] != [kind]:
+            toggle.show(kind == 0)
+            toggle.wait(seconds)
+        shown.append(kind)
+        return toggle.take()
+
+    if (count := late(take)) is None:
+        raise DeviceError(BLIND)
+    if count:
+        raise DeviceError(
+            f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue "
+            "of frames, trigger each, or let the panel settle for longer"
+        )
 
 
 def settle_time(toggle: Toggle) -> float:
@@ -77,7 +99,7 @@ def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
     telling = change >= np.quantile(change, BRIGHT)
     base = float(max(np.mean(each[telling]) for each in (bright[0], dark[0])))
     if not np.mean(change[telling]) > FAINTEST * base:
-        raise DeviceError("the picture does not change with the hologram; is this the panel that the camera sees?")
+        raise DeviceError(BLIND)
     weights = np.where(telling, bright[0] - dark[0], 0.0)
     bottom = float(np.mean([np.sum(weights * each) for each in dark]))
     top = float(np.mean([np.sum(weights * each) for each in bright]))

@@ -14,6 +14,7 @@ from ..display import DisplaySpec, load_profile
 from ..display.resolution import refuse_far
 from ..display.simulated.changes import KINDS, Value, altered
 from ..lab.bench_file import load_bench_file
+from ..lab.devices import Camera, Slm
 from ..lab.session import read_manifest
 from . import isolation
 from .definition import LEARNED, Study, Training
@@ -27,12 +28,14 @@ class RealSource:
     """Where the photographs of a display that exists come from.
 
     bench: the file that describes it (None: a profile's panel does); folder, session: the folder that photographs are
-    exchanged in, and its name (none: the devices of the bench file take them).
+    exchanged in, and its name (none: devices take them); slm, camera: these, open, in the place of the bench file's.
     """
 
     bench: Path | None = None
     folder: Path | None = None
     session: str = ""
+    slm: Slm | None = None
+    camera: Camera | None = None
 
 
 @dataclass(frozen=True)
@@ -185,9 +188,9 @@ def condition(source: str, panel: Panel | None, folder: Path) -> Condition:
     return Condition(source, folder, profile.name, profile.version, profile.digest, spec, network=network)
 
 
-def real_condition(source: str, folder: Path) -> Condition:
+def real_condition(source: str, folder: Path, slm: Slm | None = None, camera: Camera | None = None) -> Condition:
     """Read the file of a real bench without opening its devices. UserError for an invalid file."""
-    bench, real = load_bench_file(folder / source), RealSource(bench=folder / source)
+    bench, real = load_bench_file(folder / source), RealSource(folder / source, slm=slm, camera=camera)
     spec = bench.panel.spec(bench.name)
     refuse_far(spec, spec.distance)
     return Condition(source, folder, bench.name, bench.version, bench.digest, spec, real=real)

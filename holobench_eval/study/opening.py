@@ -110,4 +110,4 @@ def _open_real(display: Condition, source: RealSource, seed: int) -> RealBench:
         return RealBench(display.spec, photographer, described.panel.blaze, described.residual_bound, seed)
     assert bench is not None
     assert source.bench is not None
-    return open_live(bench, source.bench.parent, seed)
+    return open_live(bench, source.bench.parent, seed, source.slm, source.camera)

@@ -198,10 +198,18 @@ def test_a_mistake_in_a_config_or_an_option_leaves_nothing_behind(config, call):
     assert f"{config}:2:30: unknown key 'pannel' in display; did you mean 'panel'?" in error
 
 
-def test_a_new_method_is_written_and_named(config, call):
-    code, printed, _ = call("new-method", "quiet_phase", "--folder", "mine")
-    assert (code, "mine/quiet_phase.py:QuietPhase" in printed) == (0, True)
-    assert call("new-method", "quiet_phase", "--folder", "mine")[0] == 2
+def test_what_is_new_is_written_and_named(config, call):
+    for kind, name, printed in (
+        ("method", "quiet_phase", "mine/quiet_phase.py:QuietPhase"),
+        ("display", "my-display", "mine/my-display.yaml"),
+        ("camera", "my_camera.py", "camera: {driver: mine/my_camera.py:MyCamera}"),
+        ("panel", "my_panel", "slm: {driver: mine/my_panel.py:MyPanel}"),
+    ):
+        code, said, _ = call("new", kind, name, "--folder", "mine")
+        assert (code, printed in said) == (0, True)
+        assert call("new", kind, name, "--folder", "mine")[0] == 2
+    assert call("new-method", "closer", "--camera")[0] == 0  # as it was called once
+    assert call("new", "panel", "other", "--camera")[0] == 2
 
 
 def test_a_new_command_is_one_file_and_one_line(tmp_path):

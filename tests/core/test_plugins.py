@@ -104,13 +104,14 @@ def test_a_function_that_is_set_on_a_method_is_called_without_the_method(tmp_pat
     ("parameter", "message"),
     [
         ("a", "method 'mine.py:f': parameter 'a' needs an annotation or a default"),
+        ("a: float", "method 'mine.py:f' needs the parameter 'a'"),
         ("*args", "method 'mine.py:f': '*args' takes any parameters; name each of them"),
     ],
 )
 def test_a_parameter_that_no_config_can_set_is_refused_in_one_line(tmp_path: Path, parameter, message) -> None:
     (tmp_path / "mine.py").write_text(f"def f(target, bench, {parameter}): ...\n")
     with pytest.raises(UserError) as found:
-        plugins.find("methods", "mine.py:f", tmp_path)
+        plugins.build("methods", "mine.py:f", {}, tmp_path)
     assert str(found.value) == message
 
 

@@ -8,7 +8,7 @@ from holobench_eval.lab.devices import Counts, DeviceError
 from tests.study.studies import exchanged
 from tests.support.simulated_devices import BENCH, Scene, SimulatedCamera, SimulatedSlm, bench, connect
 
-FRAMES = 50  # that the camera takes in a life without a fault, about
+FRAMES = 70  # that the camera takes in a life without a fault, about
 FOREVER = 10**9
 
 STUDY = """title: faults of devices

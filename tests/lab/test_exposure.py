@@ -6,7 +6,16 @@ from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.dark import Dark, given_dark
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.exposure import Averaged, FreshCamera, auto_exposure, averaged, combined, dark_frames
+from holobench_eval.lab.exposure import (
+    Averaged,
+    FreshCamera,
+    auto_exposure,
+    averaged,
+    combined,
+    dark_frames,
+    late,
+    miscounted,
+)
 from holobench_eval.lab.settle import Toggle, settle_time
 from tests.support.simulated_devices import GREEN, Scene, SimulatedCamera, SimulatedSlm, Still, bench, pattern_phase
 
@@ -71,6 +80,9 @@ def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_t
     camera.expose(1.0)
     camera.changed("third")  # black
     assert camera.expose(1.0)[0].max() == 0
+    device.expose = lambda seconds: (np.zeros((2, 1), np.uint8), seconds)
+    with pytest.raises(DeviceError, match=r"a frame of \(2, 1\) follows one of \(1, 2\)"):
+        camera.expose(1.0)
 
 
 def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its_hot_pixel():
@@ -189,3 +201,35 @@ def test_a_bench_that_never_settles_or_a_panel_that_the_camera_does_not_see_is_o
     same = Toggle(blind.show, lambda: np.full((30, 30), 200.0), blind.wait)
     with pytest.raises(DeviceError, match="is this the panel that the camera sees"):
         settle_time(same)
+
+
+@pytest.mark.parametrize("queue", range(7))
+def test_frames_that_wait_in_a_queue_are_counted(queue):
+    random, waiting = np.random.default_rng(0), [np.zeros((20, 20)) for _ in range(queue)]
+
+    def take(kind):
+        waiting.append(speckle(1.0 + kind)[:20, :20] + random.normal(0, 0.1, (20, 20)))
+        return waiting.pop(0)
+
+    count = late(take)
+    assert count == queue if queue < 5 else count != 0
+
+
+def test_a_change_that_noise_hides_is_no_delay():
+    random = np.random.default_rng(0)
+    assert late(lambda kind: 0.01 * kind + random.normal(0, 1, (20, 20))) is None
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+@pytest.mark.parametrize("level", [0.02, 0.2, 0.7, 3.0])
+def test_counts_that_end_at_white_or_fall_off_below_it_are_right_and_those_cut_off_are_not(bits, level):
+    white = 2**bits - 1
+    random, light = np.random.default_rng(0), speckle(level / 7)
+    frame = np.clip(np.round((light + 0.01) * white + random.normal(0, 1, light.shape)), 0, white).astype(np.uint16)
+    frame[::30, ::30] = white  # hot
+    assert miscounted(frame, white) == ""
+    assert miscounted(np.full_like(frame, 40), white) == ""
+    cut = int(np.quantile(frame, 0.95))
+    if cut > 15:
+        right = "" if cut == white else f"its counts end at {cut}, below its white of {white}"
+        assert miscounted(np.minimum(frame, cut), white).startswith(right)

@@ -173,9 +173,13 @@ def test_a_dropped_frame_is_taken_again_a_device_that_fails_costs_a_cell_and_one
     with pytest.raises(CellError, match="no photograph: simulated panel: not connected"):
         bench_rig.photograph(asked())
     bench_rig.photograph(asked())
-    bench_rig.camera.failures = 1000
+    bench_rig.slm.failures = 4
     with pytest.raises(CellError, match="no photograph"):
         bench_rig.photograph(asked())
+    with pytest.raises(LostDeviceError, match="panel: not connected; mend it, and run again with --retry-failed"):
+        bench_rig.photograph(asked())
+    bench_rig.photograph(asked())
+    bench_rig.camera.failures = 1000
     with pytest.raises(LostDeviceError, match="does not answer any more: simulated camera: no frame") as error:
         bench_rig.photograph(asked())
     assert "\n" not in str(error.value)
@@ -262,9 +266,9 @@ def test_a_function_of_a_file_gets_the_channel_or_none_and_what_it_raises_is_a_d
         (LaserSettings(), 3, "either 'command' or 'callable'"),
         (LaserSettings(command=("a", "{channel}"), callable="b:c"), 3, "either"),
         (LaserSettings(command=("laser", "on")), 3, "must hold {channel}"),
-        (LaserSettings(callable="laser"), 3, "should be path/to/file.py:function"),
+        (LaserSettings(callable="laser"), 3, "should be path/to/file.py:Name"),
         (LaserSettings(callable="none.py:switch"), 3, "cannot be imported"),
-        (LaserSettings(callable="math:switch"), 3, "no function 'switch' in math"),
+        (LaserSettings(callable="math:switch"), 3, "no 'switch' in math"),
     ],
 )
 def test_settings_that_cannot_work_are_one_line(tmp_path, settings, channels, line):

@@ -9,9 +9,11 @@ from typing import Any, get_args
 
 from ...core.errors import UserError, suggest
 from ...core.installed import installed, installing
-from ...core.schema import checked
+from ...core.plugins import made
 from ..devices import DeviceError
 from .driver import Driver, Kind
+from .own import Own, own_driver
+from .slmsuite_devices import theirs
 from .worker import line
 
 # a new driver is a module with ``DRIVERS``, and its name here; in the order of listings
@@ -49,14 +51,27 @@ def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
     DeviceError: it is there, but does not answer.
     """
     settings = checked_params(kind, driver, params)
-    return DRIVERS[kind][driver].opens(settings)
+    return _driver(kind, driver).opens(settings)
 
 
 def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
     """The settings of a driver, without opening anything, so that a bench file is refused before any device moves."""
-    if driver not in DRIVERS[kind]:
-        raise UserError(f"unknown {kind} driver '{driver}'; {suggest(driver, DRIVERS[kind])}")
-    return checked(DRIVERS[kind][driver].settings, dict(params), f"{kind} driver '{driver}'")
+    return made(_driver(kind, driver).settings, f"{kind} driver '{driver}'", dict(params))
+
+
+def adopted(kind: Kind, device: Any) -> Own:
+    """An open device of a user's, or of slmsuite's. UserError: it lacks something."""
+    call, interface = ("show", "set_phase") if kind == "slm" else ("expose", "get_image")
+    is_theirs = hasattr(device, interface) and not hasattr(device, call)
+    return Own(kind, theirs(kind, device) if is_theirs else device)
+
+
+def _driver(kind: Kind, name: str) -> Driver:
+    if name in DRIVERS[kind]:
+        return DRIVERS[kind][name]
+    if ":" in name:
+        return own_driver(kind, name)
+    raise UserError(f"unknown {kind} driver '{name}'; {suggest(name, DRIVERS[kind])}, or path/to/file.py:Class")
 
 
 def survey() -> list[Survey]:

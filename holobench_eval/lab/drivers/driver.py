@@ -5,12 +5,18 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from ...core.errors import UserError
+from ...core.errors import UserError, suggest
+from ...core.hashing import State, file_state
 from ...core.installed import installing
+from ...core.plugins import is_file
+from ...core.sources import import_file
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
 from .worker import line
@@ -38,6 +44,36 @@ class Driver:
     unlisted: str = ""
 
 
+def load(name: str, what: str) -> Any:
+    """A class or a function, ``path/to/file.py:Name`` or ``module:Name``. UserError: there is none.
+
+    A file is imported once for what it holds, so that a panel and a camera in it know of each other.
+    """
+    source, _, attribute = name.rpartition(":")
+    if not source:
+        raise UserError(f"{what} '{name}' should be path/to/file.py:Name or module:Name")
+    try:
+        is_python = source.endswith(".py")
+        module = _imported(source, file_state(source)) if is_python else importlib.import_module(source)
+    except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
+        raise UserError(f"{what} '{name}' cannot be imported: {line(error)}") from error
+    found = getattr(module, attribute, None)
+    if not callable(found):
+        own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
+        raise UserError(f"{what} '{name}': there is no '{attribute}' in {source}; {suggest(attribute, own)}")
+    return found
+
+
+def located(name: str, folder: Path) -> str:
+    """A name for `load`, where relative paths start in a folder."""
+    return str((folder / name).absolute()) if is_file(name) else name
+
+
+@lru_cache(maxsize=16)
+def _imported(file: str, _state: State | None) -> ModuleType:
+    return import_file(Path(file))
+
+
 def import_package(driver: str, module: str, package: str, extra: str) -> Any:
     """The module of an optional package; UserError with the command that installs it."""
     try:
@@ -63,7 +99,13 @@ def check_levels(name: str, shape: tuple[int, int], levels: Levels) -> None:
 
 def check_counts(name: str, frame: Counts, white: float, hint: str = "") -> None:
     """DeviceError unless a camera's frame has whole counts up to its white; hint: what to do where it goes beyond."""
-    if frame.dtype not in (np.uint8, np.uint16) or frame.ndim not in (2, 3) or not frame.size:
-        raise DeviceError(f"{name} gave a {frame.dtype} frame of {frame.shape}, not whole counts")
+    if (
+        frame.dtype not in (np.uint8, np.uint16)
+        or frame.shape[2:] not in ((), (3,))
+        or frame.ndim < 2
+        or not frame.size
+    ):
+        right = "whole counts, uint8 or uint16 of (H, W) or (H, W, 3)"
+        raise DeviceError(f"{name} gave {frame.dtype} of {frame.shape}; expected {right}")
     if frame.max() > white:
         raise DeviceError(f"{name} gave {frame.max()} counts, but {white:.0f} are its white{hint}")

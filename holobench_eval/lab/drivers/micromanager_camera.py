@@ -12,11 +12,9 @@ from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError, suggest
 from ..devices import Counts
-from .driver import Driver, check_counts, import_package
-from .worker import Worker, closed_on_failure, line
-
-OPENING = 120.0  # seconds; a configuration loads every device of a microscope
-READING = 20.0  # beyond the exposure
+from .driver import Driver, import_package
+from .own import opened
+from .worker import closed_on_failure, line
 
 Seconds = Annotated[float, Interval(gt=0, le=3600)]
 
@@ -39,7 +37,7 @@ class MicromanagerSettings:
 
 
 class MicromanagerCamera:
-    """A camera of Micro-Manager's as a `Camera`; what it does of itself is switched off in its properties."""
+    """A camera of Micro-Manager's as a device that `Own` takes; its properties switch off what it does of itself."""
 
     def __init__(self, settings: MicromanagerSettings) -> None:
         """UserError: the package is missing, no such file, label, property or value, no whole counts, no bounds."""
@@ -47,17 +45,13 @@ class MicromanagerCamera:
             raise UserError(f"driver 'micromanager': no such configuration: {settings.config}")
         self.name = "Micro-Manager"
         self._core: Any = None
-        self._worker = Worker(self.name)
         with closed_on_failure(self.close):
-            self._worker.call("loading its configuration", OPENING, lambda: self._open(settings))
-
-    def expose(self, seconds: float) -> tuple[Counts, float]:
-        """A snap, and the exposure [s] that the camera reports of it."""
-        return self._worker.call("taking a picture", READING + 2 * seconds, lambda: self._snap(seconds))
+            self._open(settings)
 
     def close(self) -> None:
         """Give every device of the configuration back."""
-        self._worker.stop(READING, lambda: self._core and self._core.unloadAllDevices())
+        if self._core:
+            self._core.unloadAllDevices()
 
     def _open(self, settings: MicromanagerSettings) -> None:
         self._core = core = _core()
@@ -79,7 +73,7 @@ class MicromanagerCamera:
             raise UserError(f"driver 'micromanager': no camera '{label}' in it; {suggest(label, cameras)}")
         core.setCameraDevice(label)
         self._set(settings.properties)
-        self.name = self._worker.name = f"Micro-Manager {core.getDeviceName(label)} {label}"
+        self.name = f"Micro-Manager {core.getDeviceName(label)} {label}"
 
         if core.getNumberOfComponents() not in (1, 4) or self._bytes_of_a_sample() > 2:
             raise UserError(f"{self.name} gives no 8 or 16 bit counts; set another PixelType in properties")
@@ -112,15 +106,15 @@ class MicromanagerCamera:
                 return max(lower / 1000, 1e-6), upper / 1000
         raise UserError(f"{self.name} does not tell its exposures; add exposures: [0.0001, 1.0]")
 
-    def _snap(self, seconds: float) -> tuple[Counts, float]:
+    def expose(self, seconds: float) -> tuple[Counts, float]:
+        """A snap, and the exposure [s] that the camera reports of it."""
         core = self._core
         core.setExposure(seconds * 1000)
         core.waitForDevice(self._label)
         real = core.getExposure() / 1000
         core.snapImage()
         frame = np.asarray(core.getImage())
-        check_counts(self.name, frame, self.white)
-        return frame[..., :3].copy() if frame.ndim == 3 else frame.copy(), real
+        return frame[..., :3] if frame.ndim == 3 else frame, real
 
 
 def list_installations() -> list[str]:
@@ -143,7 +137,7 @@ DRIVERS = (
         "camera",
         "micromanager",
         MicromanagerSettings,
-        MicromanagerCamera,
+        lambda settings: opened("camera", "Micro-Manager", lambda: MicromanagerCamera(settings)),
         "pymmcore-plus",
         "micromanager",
         lambda: list_installations() and [],

@@ -16,11 +16,9 @@ from annotated_types import Interval, MinLen
 
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
-from .driver import Driver, check_counts
-from .worker import Worker, closed_on_failure
-
-OPENING = 30.0  # seconds
-READING = 20.0  # beyond the exposures
+from .driver import Driver
+from .own import Own, opened
+from .worker import closed_on_failure
 
 STALE = 5  # frames that a driver may hold back although it is asked for one
 ABSENT = (-1.0,)  # what OpenCV says of a control that the driver does not have
@@ -55,7 +53,7 @@ class OpencvSettings:
 
 
 class OpencvCamera:
-    """A USB video camera as a `Camera`; colour frames come as red, green, blue."""
+    """A USB video camera as a device that `Own` takes; colour frames come as red, green, blue."""
 
     def __init__(self, settings: OpencvSettings, capture: Any = None) -> None:
         """capture: an open ``cv2.VideoCapture`` or what stands for one; without it the device is opened.
@@ -67,23 +65,13 @@ class OpencvCamera:
         self.white = float(2**settings.bits - 1)
         self._settings = settings
         self._capture = capture
-        self._worker = Worker(self.name)
         with closed_on_failure(self.close):
-            self._worker.call("opening", OPENING, self._open)
-
-    def expose(self, seconds: float) -> tuple[Counts, float]:
-        """A frame after some that are thrown away, since the driver had begun them before, and its exposure [s]."""
-        frame, real = self._worker.call("taking a picture", READING + 3 * STALE * seconds, lambda: self._take(seconds))
-        columns, rows = self._settings.resolution
-        kind = np.uint16 if self._settings.format == "Y16" else np.uint8
-        if frame.dtype != kind or frame.shape not in ((rows, columns), (rows, columns, 3)):
-            raise DeviceError(f"{self.name} gave a {frame.dtype} frame of {frame.shape}, not {kind.__name__}")
-        check_counts(self.name, frame, self.white, "; set bits")
-        return frame, real
+            self._open()
 
     def close(self) -> None:
         """Give the camera back."""
-        self._worker.stop(READING, lambda: self._capture and self._capture.release())
+        if self._capture:
+            self._capture.release()
 
     def _open(self) -> None:
         import cv2
@@ -130,7 +118,8 @@ class OpencvCamera:
                 "driver of its maker's"
             )
 
-    def _take(self, seconds: float) -> tuple[Counts, float]:
+    def expose(self, seconds: float) -> tuple[Counts, float]:
+        """A frame after some that are thrown away, since the driver had begun them before, and its exposure [s]."""
         import cv2
 
         capture = self._capture
@@ -148,6 +137,9 @@ class OpencvCamera:
             frame = frame[..., ::-1]
         elif frame.size == rows * columns:  # OpenCV gives what it does not convert with an axis too many, or as bytes
             frame = frame.reshape(rows, columns)
+        kind = np.uint16 if self._settings.format == "Y16" else np.uint8
+        if frame.dtype != kind or frame.shape not in ((rows, columns), (rows, columns, 3)):
+            raise DeviceError(f"{self.name} gave a {frame.dtype} frame of {frame.shape}, not {kind.__name__}")
         return np.ascontiguousarray(frame), value / 1e4
 
 
@@ -156,4 +148,8 @@ def list_cameras() -> list[str]:
     return sorted(str(link) for link in Path("/dev/v4l/by-id").glob("*"))
 
 
-DRIVERS = (Driver("camera", "opencv", OpencvSettings, OpencvCamera, "opencv-python-headless", "", list_cameras),)
+def _opens(settings: OpencvSettings) -> Own:
+    return opened("camera", f"camera {settings.device}", lambda: OpencvCamera(settings))
+
+
+DRIVERS = (Driver("camera", "opencv", OpencvSettings, _opens, "opencv-python-headless", "", list_cameras),)

@@ -11,7 +11,6 @@ import importlib
 import logging
 import pkgutil
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -21,14 +20,11 @@ from annotated_types import MinLen
 from ...core.errors import UserError, suggest
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .driver import Driver, Kind, check_counts, check_levels, import_package
-from .worker import Worker, closed_on_failure, line
+from .driver import Driver, Kind, import_package, load
+from .own import Own, opened
+from .worker import line
 
 Hardware = Literal["slms", "cameras"]
-
-OPENING = 60.0  # seconds; some SDKs upload a look-up table first
-SHOWING = 20.0
-READING = 20.0  # beyond the exposures
 
 # they have a driver here that can tell what slmsuite's cannot: which monitor, and what a camera does of itself
 ELSEWHERE = {
@@ -42,7 +38,8 @@ ELSEWHERE = {
 class SlmsuiteSettings:
     """Which class of slmsuite, and what it is built with.
 
-    device: module and class, such as ``holoeye.Holoeye`` or ``thorlabs.ThorCam``; arguments: the class's own, such as
+    device: module and class, such as ``holoeye.Holoeye`` or ``thorlabs.ThorCam``, or another one with slmsuite's
+    interface, ``path/to/file.py:Class`` or ``module:Class``; arguments: the class's own, such as
     ``{preselect: "index:0", wav_um: 0.52}`` (slmsuite's documentation lists them).
     """
 
@@ -51,68 +48,43 @@ class SlmsuiteSettings:
 
 
 class SlmsuiteSlm:
-    """Any panel of slmsuite's with 8 bits, as an `Slm`."""
+    """Any panel with slmsuite's interface and 8 bits, open, as a device that `Own` takes. UserError for other bits."""
 
-    def __init__(self, make: SlmsuiteSettings | Any) -> None:
-        """make: settings, or an slmsuite SLM that is open already (it is closed with this).
-
-        UserError: no such class, wrong arguments, its maker's software is missing, not 8 bits.
-        """
-        self._worker, self._slm = _opened("slms", make)
-        self.name = f"slmsuite {self._slm.name}"
-        self.shape: tuple[int, int] = tuple(int(side) for side in self._slm.shape)  # type: ignore[assignment]
-        if self._slm.bitdepth != 8:
-            self.close()
-            raise UserError(f"{self.name} takes {self._slm.bitdepth} bits, not 8; set it to 8 bits in its arguments")
+    def __init__(self, slm: Any) -> None:
+        self._slm, self.name, self.shape, self.close = slm, f"slmsuite {slm.name}", slm.shape, slm.close
+        if slm.bitdepth != 8:
+            slm.close()
+            raise UserError(f"{self.name} takes {slm.bitdepth} bits, not 8; set it to 8 bits in its arguments")
 
     def show(self, levels: Levels) -> None:
         """Show ``(H, W)`` uint8 levels as they are; returns when slmsuite says that they are written."""
-        check_levels(self.name, self.shape, levels)
-        # a driver may keep the array it is given
-        written = self._worker.call("showing a picture", SHOWING, lambda: self._write(levels.copy()))
+        written = self._slm.set_phase(levels.copy(), phase_correct=False, settle=False)
+        written = np.asarray(
+            written.get() if hasattr(written, "get") else written
+        )  # get: from a graphics card's memory
         if written.dtype != np.uint8 or not np.array_equal(written, levels):
             raise DeviceError(f"{self.name}: slmsuite altered the levels; this panel's class cannot be used")
 
-    def close(self) -> None:
-        """Give the panel back."""
-        self._worker.stop(SHOWING, self._slm.close)
-
-    def _write(self, levels: Levels) -> Any:
-        written = self._slm.set_phase(levels, phase_correct=False, settle=False)
-        return np.asarray(written.get() if hasattr(written, "get") else written)  # get: from a graphics card's memory
-
 
 class SlmsuiteCamera:
-    """Any camera of slmsuite's, as a `Camera`: of a colour camera the one channel that slmsuite keeps."""
+    """Any camera with slmsuite's interface, open, as a device that `Own` takes: of colours the channel that it keeps.
 
-    def __init__(self, make: SlmsuiteSettings | Any) -> None:
-        """make: settings, or an slmsuite camera that is open already (it is closed with this).
+    UserError where it does not tell its exposures.
+    """
 
-        UserError: no such class, wrong arguments, its maker's software is missing, unknown exposure bounds.
-        """
-        self._worker, self._camera = _opened("cameras", make)
-        self.name = f"slmsuite {self._camera.name}"
+    def __init__(self, camera: Any) -> None:
+        self._camera, self.name, self.close = camera, f"slmsuite {camera.name}", camera.close
         # slmsuite would add frames up; the mean is taken by whoever asks for several
-        self._camera.averaging = self._camera.hdr = None
-        self.white = float(self._camera.bitresolution - 1)
-        if self._camera.exposure_bounds_s is None:
-            self.close()
+        camera.averaging = camera.hdr = None
+        self.white = camera.bitresolution - 1
+        if camera.exposure_bounds_s is None:
+            camera.close()
             raise UserError(f"{self.name} does not tell its exposures; add arguments.exposure_bounds_s: [1e-4, 1.0]")
-        shortest, longest = (float(bound) for bound in self._camera.exposure_bounds_s)
-        self.exposures = max(shortest, 1e-6), longest
+        shortest, longest = camera.exposure_bounds_s
+        self.exposures = max(float(shortest), 1e-6), float(longest)
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """A frame that was begun after the call, and the exposure [s] that the camera reports of it."""
-        limit = READING + 6 * seconds * self._camera.capture_attempts  # some frames are thrown away first
-        frame, real = self._worker.call("taking a picture", limit, lambda: self._take(seconds))
-        check_counts(self.name, frame, self.white, "; set its bit depth")
-        return frame, real
-
-    def close(self) -> None:
-        """Give the camera back."""
-        self._worker.stop(READING, self._camera.close)
-
-    def _take(self, seconds: float) -> tuple[Counts, float]:
         real = float(self._camera.set_exposure(seconds))
         self._camera.flush()
         return np.asarray(self._camera.get_image(averaging=False, hdr=False)), real
@@ -127,17 +99,9 @@ def classes(kind: Hardware) -> list[str]:
     return sorted(name for name in names if not name.startswith("_") and name not in ("camera", "slm", "template"))
 
 
-def _opened(kind: Hardware, make: SlmsuiteSettings | Any) -> tuple[Worker, Any]:
-    """The device and the thread that it lives on."""
-    if not isinstance(make, SlmsuiteSettings):
-        return Worker(f"slmsuite {make.name}"), make
-    maker = _find(kind, make.device)
-    worker = Worker(f"slmsuite {make.device}")
-    with closed_on_failure(lambda: worker.stop(0, lambda: None)):
-        return worker, worker.call("opening", OPENING, lambda: _build(maker, make.device, make.arguments))
-
-
 def _find(kind: Hardware, device: str) -> Any:
+    if ":" in device:
+        return load(device, "device")
     module, _, name = device.partition(".")
     if device in ELSEWHERE:
         raise UserError(f"device '{device}': take {ELSEWHERE[device]}")
@@ -158,23 +122,36 @@ def _find(kind: Hardware, device: str) -> Any:
     return device_classes[name]
 
 
-def _build(maker: Any, device: str, arguments: Mapping[str, Any]) -> Any:
+def _build(kind: Kind, settings: SlmsuiteSettings, maker: Any) -> Any:
     try:
-        return maker(**arguments)
+        device = maker(**settings.arguments)
     except ImportError as error:
-        raise UserError(f"device '{device}' needs its maker's software: {line(error)}") from error
+        raise UserError(f"device '{settings.device}' needs its maker's software: {line(error)}") from error
     except (TypeError, ValueError) as error:
-        raise UserError(f"device '{device}' cannot be built with these arguments: {line(error)}") from error
+        raise UserError(f"device '{settings.device}' cannot be built with these arguments: {line(error)}") from error
+    return theirs(kind, device)
 
 
-def _driver(kind: Kind, hardware: Hardware, cls: type[Any], words: str, example: str) -> Driver:
+def theirs(kind: Kind, device: Any) -> SlmsuiteSlm | SlmsuiteCamera:
+    """An open device with slmsuite's interface. UserError for another one."""
+    try:
+        return SlmsuiteSlm(device) if kind == "slm" else SlmsuiteCamera(device)
+    except AttributeError as error:
+        raise UserError(f"{kind} without the interface of slmsuite's: {error}") from error
+
+
+def _driver(kind: Kind, hardware: Hardware, words: str, example: str) -> Driver:
+    def opens(settings: SlmsuiteSettings) -> Own:
+        maker = _find(hardware, settings.device)
+        return opened(kind, f"slmsuite {settings.device}", lambda: _build(kind, settings, maker))
+
     why = f"slmsuite does not look for {words}: give the class of yours as device, such as {example}"
     return Driver(
-        kind, "slmsuite", SlmsuiteSettings, cls, "slmsuite", "slmsuite", lambda: classes(hardware) and [], why
+        kind, "slmsuite", SlmsuiteSettings, opens, "slmsuite", "slmsuite", lambda: classes(hardware) and [], why
     )
 
 
 DRIVERS = (
-    _driver("slm", "slms", SlmsuiteSlm, "panels", "holoeye.Holoeye"),
-    _driver("camera", "cameras", SlmsuiteCamera, "cameras", "thorlabs.ThorCam"),
+    _driver("slm", "slms", "panels", "holoeye.Holoeye"),
+    _driver("camera", "cameras", "cameras", "thorlabs.ThorCam"),
 )

@@ -13,7 +13,7 @@ from ...core.hashing import digest
 from ...core.io import write_atomically
 from ...core.yaml_source import load
 from ...imaging.convention import Convention
-from ...lab.bench_file import BenchFile, load_bench_file
+from ...lab.bench_file import BenchFile, device_files, load_bench_file
 from ...lab.dark import given_dark
 from ...lab.live import letter
 from ...lab.real import RealBench
@@ -122,8 +122,10 @@ def _beside(bench: BenchFile, file: Path, copied: str | None) -> dict[Path, Path
     copied: place of that copy. UserError for a file that does not lie in the bench file's folder.
     """
     named = {} if bench.phase.correction is None else {"phase.correction.file": Path(bench.phase.correction.file)}
-    if isinstance(bench.capture.dark, str) and copied and _stays_inside(copied):  # else it is read where it is
-        named["capture.dark"] = Path(os.path.relpath(bench.capture.dark, file.resolve().parent))
+    if copied and _stays_inside(copied):  # else they are read where they are
+        others = device_files(bench, file.parent)
+        others |= {"capture.dark": Path(bench.capture.dark)} if isinstance(bench.capture.dark, str) else {}
+        named |= {key: Path(os.path.relpath(other.resolve(), file.resolve().parent)) for key, other in others.items()}
     for key, name in named.items():
         if not (copied and _stays_inside(copied) and _stays_inside(str(name))):
             raise UserError(f"{file}: {key}: {name} does not travel with a session; put it beside this file")

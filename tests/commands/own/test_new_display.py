@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from holobench_eval.commands.own.new_display import display_text, new_display
+from holobench_eval.commands.own.new import display_text, write_display
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.parameters import parameters
 from holobench_eval.display import load_profile
@@ -12,7 +12,7 @@ from holobench_eval.display.simulated.stages import PixelAperture
 
 
 def test_a_new_display_is_the_panel_that_it_starts_from_with_all_else_off(tmp_path):
-    new_display("mine", tmp_path)
+    write_display("mine", tmp_path)
     profile = load_profile(str(tmp_path / "mine.yaml"))
     assert profile.panel == load_profile("ideal").panel
     plain = Profile("mine", 1, 0, "A display of my own.", profile.panel, digest=profile.digest)
@@ -40,6 +40,6 @@ def test_a_new_display_names_every_key_and_loads_with_all_of_them(tmp_path):
 def test_a_name_that_cannot_be_is_one_line_and_writes_nothing(tmp_path, name, says):
     (tmp_path / "mine.yaml").write_text("own: work\n")
     with pytest.raises(UserError, match=says):
-        new_display(name, tmp_path)
+        write_display(name, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
     assert (tmp_path / "mine.yaml").read_text() == "own: work\n"

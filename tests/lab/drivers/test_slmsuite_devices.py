@@ -8,8 +8,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.drivers.catalogue import open_device
-from holobench_eval.lab.drivers.slmsuite_devices import SlmsuiteCamera
+from holobench_eval.lab.drivers.catalogue import adopted, open_device
+from holobench_eval.lab.drivers.own import Own
 
 pytest.importorskip("slmsuite", reason="slmsuite is not installed: pip install --no-deps slmsuite h5py tqdm")
 
@@ -26,24 +26,26 @@ def slm() -> Iterator[Any]:
 
 
 @pytest.fixture
-def camera(slm: Any) -> Iterator[SlmsuiteCamera]:
+def camera(slm: Any) -> Iterator[Own]:
     """Looks at the far field of the panel."""
     simulated = pytest.importorskip("slmsuite.hardware.cameras.simulated")
-    device = simulated.SimulatedCamera(slm._slm, bitdepth=12, exposure_bounds_s=(1e-4, 10), gain=0.05)
-    camera = SlmsuiteCamera(device)
+    device = simulated.SimulatedCamera(slm._device._slm, bitdepth=12, exposure_bounds_s=(1e-4, 10), gain=0.05)
+    camera = adopted("camera", device)
     yield camera
     camera.close()
 
 
 def test_levels_reach_the_panel_as_they_are_whatever_is_stored_in_slmsuite(slm: Any) -> None:
     assert slm.shape == SHAPE
-    slm._slm.source["phase"] = np.full(SHAPE, 1.0)  # a wavefront correction, applied to whatever comes in radians
-    slm._slm.phase_correct = True
+    slm._device._slm.source["phase"] = np.full(
+        SHAPE, 1.0
+    )  # a wavefront correction, applied to whatever comes in radians
+    slm._device._slm.phase_correct = True
     for levels in (LEVELS, np.arange(256, dtype=np.uint8).repeat(75).reshape(SHAPE)):
         given = levels.copy()
         slm.show(given)
         given[:] = 0  # the caller goes on with the array
-        assert np.array_equal(slm._slm.display, levels)
+        assert np.array_equal(slm._device._slm.display, levels)
 
 
 def test_levels_of_another_shape_or_type_are_never_cropped_or_converted(slm: Any) -> None:
@@ -53,7 +55,7 @@ def test_levels_of_another_shape_or_type_are_never_cropped_or_converted(slm: Any
 
 
 def test_a_panel_that_alters_levels_is_found_out(slm: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slm._slm, "_gray2display", lambda gray: gray // 2)
+    monkeypatch.setattr(slm._device._slm, "_gray2display", lambda gray: gray // 2)
     with pytest.raises(DeviceError, match="altered the levels"):
         slm.show(LEVELS)
 
@@ -63,7 +65,7 @@ def test_a_panel_of_ten_bits_is_refused() -> None:
         open_device("slm", "slmsuite", {**PANEL, "arguments": {**PANEL["arguments"], "bitdepth": 10}})
 
 
-def test_the_camera_sees_what_the_panel_shows(slm: Any, camera: SlmsuiteCamera) -> None:
+def test_the_camera_sees_what_the_panel_shows(slm: Any, camera: Own) -> None:
     ramp = (np.arange(160) * 16 % 256).astype(np.uint8)[None].repeat(120, 0)
     bright = []
     for levels in (np.zeros(SHAPE, np.uint8), ramp, ramp[:, ::-1].copy()):
@@ -75,9 +77,9 @@ def test_the_camera_sees_what_the_panel_shows(slm: Any, camera: SlmsuiteCamera) 
     assert bright[1] - 80 == 80 - bright[2] != 0
 
 
-def test_counts_grow_with_the_exposure_up_to_white(slm: Any, camera: SlmsuiteCamera) -> None:
+def test_counts_grow_with_the_exposure_up_to_white(slm: Any, camera: Own) -> None:
     slm.show(LEVELS)
-    camera._camera.gain = 5000.0  # speckle has less light in one place than a spot
+    camera._device._camera.gain = 5000.0  # speckle has less light in one place than a spot
     assert (camera.white, camera.exposures) == (4095, (1e-4, 10))
     totals = []
     for seconds in (0.01, 0.02, 0.04):
@@ -90,12 +92,12 @@ def test_counts_grow_with_the_exposure_up_to_white(slm: Any, camera: SlmsuiteCam
 
 def test_frames_are_not_added_up_whatever_the_camera_is_set_to_and_it_needs_bounds_of_its_exposure(slm: Any) -> None:
     simulated = pytest.importorskip("slmsuite.hardware.cameras.simulated")
-    device = simulated.SimulatedCamera(slm._slm, bitdepth=8, averaging=4, exposure_bounds_s=(1e-4, 10))
-    camera = SlmsuiteCamera(device)
+    device = simulated.SimulatedCamera(slm._device._slm, bitdepth=8, averaging=4, exposure_bounds_s=(1e-4, 10))
+    camera = adopted("camera", device)
     assert camera.white == 255
     assert camera.expose(1.0)[0].max() <= 255
     with pytest.raises(UserError, match="exposure_bounds_s"):
-        SlmsuiteCamera(simulated.SimulatedCamera(slm._slm))
+        adopted("camera", simulated.SimulatedCamera(slm._device._slm))
 
 
 @pytest.mark.parametrize(

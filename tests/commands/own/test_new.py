@@ -8,19 +8,20 @@ import pytest
 import torch
 
 from holobench_eval.commands import app
-from holobench_eval.commands.own.new_method import write_method
+from holobench_eval.commands.own.new import write_code
 from holobench_eval.core import plugins
 from holobench_eval.core.errors import UserError
 from holobench_eval.display import load_profile
 from holobench_eval.study.opening import open_bench
 
-KINDS = ("method", "camera", "trains")
+KINDS = dict.fromkeys(("method", "captures", "trains"), "keeps_the_contract")
+KINDS |= dict.fromkeys(("camera", "panel"), "can_be_measured_with")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_new_method_is_clean_and_passes_its_own_test(kind, tmp_path):
-    _, test, _ = write_method("quiet_phase", tmp_path / "mine", kind)
-    runpy.run_path(str(test))["test_quiet_phase_keeps_the_contract"]()
+def test_what_is_new_is_clean_and_passes_its_own_test(kind, tmp_path):
+    _, test, _ = write_code("quiet_phase", tmp_path / "mine", kind)
+    runpy.run_path(str(test))[f"test_quiet_phase_{KINDS[kind]}"]()
     ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--line-length", "120", str(tmp_path)]
     # in a folder where the package is not the user's own
     done = subprocess.run(ruff, capture_output=True, text=True, check=False, cwd=tmp_path)
@@ -28,7 +29,7 @@ def test_a_new_method_is_clean_and_passes_its_own_test(kind, tmp_path):
 
 
 def test_a_new_method_gets_nearer_to_its_target_with_every_step(tmp_path):
-    _, _, named = write_method("quiet_phase", tmp_path)
+    _, _, named = write_code("quiet_phase", tmp_path)
     assert named == f"{tmp_path}/quiet_phase.py:QuietPhase"
     bench = open_bench(load_profile("ideal"), (64, 64), seed=0)
     region = bench.spec.region
@@ -60,8 +61,8 @@ methods:
 
 def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    write_method("sees", tmp_path, "camera")
-    write_method("learns", tmp_path, "trains")
+    write_code("sees", tmp_path, "captures")
+    write_code("learns", tmp_path, "trains")
     Path("study.yaml").write_text(STUDY)
     app(["run", "study.yaml", "--executor", "serial"], standalone_mode=False)
     rows = pd.read_csv("holoeval-results/study/records.csv").set_index("label")
@@ -73,19 +74,19 @@ def test_new_methods_that_capture_or_learn_run_in_a_study_and_gain_by_it(tmp_pat
 def test_existing_files_are_never_overwritten(tmp_path):
     (tmp_path / "test_quiet_phase.py").write_text("mine")
     with pytest.raises(UserError, match="exists already"):
-        write_method("quiet_phase", tmp_path)
+        write_code("quiet_phase", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["test_quiet_phase.py"]
     assert (tmp_path / "test_quiet_phase.py").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["", "2fast", "Quiet", "a-b", "../a", "class", "a.b", "_x", "é", "random", "torch"])
 def test_names_that_are_no_modules_or_would_hide_one_are_refused(tmp_path, name):
-    with pytest.raises(UserError, match="would hide" if name in ("random", "torch") else "is no name for a method"):
-        write_method(name, tmp_path)
+    with pytest.raises(UserError, match="would hide" if name in ("random", "torch") else "is no name for a module"):
+        write_code(name, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
-        write_method("quiet_phase", tmp_path / "file" / "folder")
+        write_code("quiet_phase", tmp_path / "file" / "folder")
