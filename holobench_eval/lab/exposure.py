@@ -17,6 +17,7 @@ ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full st
 DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
 TRIES = 16
 STRONGEST_STEP = 32.0
+FEW = 0.01  # of the samples, which may be hot pixels where no more are at full scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +99,18 @@ def auto_exposure(camera: Camera, plane: int) -> float:
         frame, real = _exposed(camera, seconds, plane)
         # dark level and background; where it is not dark at all, the steps are only less exact
         dark, bright = np.percentile(frame, (1, PERCENTILE))
-        fill = float((bright - dark) / max(camera.white - dark, 1))
+        fill, full = float((bright - dark) / max(camera.white - dark, 1)), float(np.mean(frame >= camera.white))
         if bright >= camera.white:
-            step = 1 / STRONGEST_STEP if np.mean(frame >= camera.white) > 0.1 else 0.25
+            step = 1 / STRONGEST_STEP if full > 0.1 else 0.25
         else:
             step = min(max(FILL / max(fill, 1e-6), 1 / STRONGEST_STEP), STRONGEST_STEP)
             if ACCEPTED[0] <= 1 / step <= ACCEPTED[1]:
                 return real
         if step < 1 and seconds <= shortest:
+            hot = f"; hot pixels, if the {full:.2%} at full scale are, its own software replaces" * (0 < full <= FEW)
             raise DeviceError(
                 f"{camera.name}: too much light even at its shortest exposure of {shortest:.2g} s; "
-                "lower the laser's power or add a filter"
+                f"lower the laser's power or add a filter{hot}"
             )
         if step > 1 and seconds >= longest:
             if fill >= DIMMEST:
