@@ -77,7 +77,9 @@ def _odd(captures: Sequence[Record], folders: Folders, psnr: str) -> Iterator[st
         return
     without = [f"{_name(r)} {v[psnr] + gain:.2f} dB for {v[psnr]:.2f} ({v['odd_pixels']:.0f})" for gain, r, v in odd]
     dark = folders.captures[odd[0][1].label, odd[0][1].target].dark
-    remedy = "" if dark and dark.bias.size > 1 else " A dark frame takes hot ones off: --dark FILE, not LEVEL."
+    linear = "" if odd[0][1].capture["values"] == "linear" else "save linear counts and "
+    remedy = f" To take hot ones off, {linear}give a dark frame and no level: --dark FILE."
+    remedy = "" if dark and dark.bias.size > 1 else remedy
     yield (
         "Pixels, rows or columns stand out from all around them, as hot, dead and mosaic ones of a camera do and light "
         f"does not. They can turn the order of methods. PSNR without them, and how many: {named(without)}.{remedy}"

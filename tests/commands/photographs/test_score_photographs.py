@@ -377,7 +377,10 @@ def test_hot_pixels_are_told_with_the_score_without_them_and_never_called_over_e
     assert "over-exposed" not in records.loc["full", "reason"]
     assert records.loc["hot", "psnr_linear_mended_db"] == pytest.approx(records.loc["good", "psnr_linear_db"], abs=0.3)
     assert records.loc["hot", "psnr_linear_db"] < records.loc["good", "psnr_linear_db"] - 2
-    assert re.search(r"PSNR without them, and how many: hot/t \d\d\.\d\d dB for .*\(6\)\. A dark frame", terminal)
+    assert re.search(
+        r"PSNR without them, and how many: hot/t \d\d\.\d\d dB for .*\(6\)\. To take hot ones off, give a dark frame",
+        terminal,
+    )
     assert "good/t" not in terminal
     counts(tmp_path, "t.png", np.minimum(9 * seen, 0.61), "good")
     reason = run(tmp_path, "linear", aligned=True)[2].loc[("good", "t"), "reason"]
