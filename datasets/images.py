@@ -39,7 +39,8 @@ class GrayImageError(PictureError):
 def read(path: Path) -> bytes:
     """The contents of an image file; UserError when it is missing, no regular file, unreadable or too large."""
     if not path.is_file():
-        raise UserError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}; {RIGHT}")
+        absent = "a link that leads to no file" if path.is_symlink() else "no such file"
+        raise UserError(f"{path}: {'not a regular file' if path.exists() else absent}; {RIGHT}")
     try:
         return read_regular(path, LARGEST_BYTES)
     except OSError as error:

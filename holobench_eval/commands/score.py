@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,7 +20,6 @@ from .output import print_answer, print_headline
 
 if TYPE_CHECKING:
     from ..report import Results
-    from ..study.folders.files import Folders
 
 # How files are read.
 VALUES = {
@@ -100,7 +100,8 @@ def score_folders(
     _refuse(options)
     taken_off, told = (None, "") if dark is None else given_dark(dark, upright=True)
     folders = read_folders(captures, targets, values == "linear", taken_off)
-    _refuse_pictures(folders, values, baseline)
+    if baseline is not None and baseline not in folders.methods:
+        raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
     scoring = Scoring(folders, Store(output), values, lpips_weights, draw_alignment, visible, aligned, told)
     with scoring.store.locked():
         known = provenance.begin(output, described(folders, values, told), resumed=True)
@@ -135,7 +136,7 @@ def _refuse(options: Mapping[str, Any]) -> None:
     if values not in VALUES:
         raise UserError(f"--values {values}: {suggest(values, VALUES)}")
     for source in (options["--captures"], options["--targets"]):
-        if output.resolve().is_relative_to(source.resolve()):
+        if Path(os.path.realpath(output)).is_relative_to(os.path.realpath(source)):
             mixed = f"lies in {source}, whose files it would mix with"
             raise UserError(f"--output {output}: {mixed}; expected another folder")
     if options["--visible"] and options["--aligned"]:
@@ -143,17 +144,6 @@ def _refuse(options: Mapping[str, Any]) -> None:
     if dark is not None and values != "linear":
         encoded = "is taken off counts of light, not off encoded values"
         raise UserError(f"--dark {dark}: {encoded}; expected --values linear")
-
-
-def _refuse_pictures(folders: Folders, values: str, baseline: str | None) -> None:
-    """UserError for captures that are not of such values, and for a baseline that is not among them."""
-    if baseline is not None and baseline not in folders.methods:
-        raise UserError(f"--baseline {baseline}: no such folder of captures; {suggest(baseline, folders.methods)}")
-    for picture in folders.captures.values():
-        if values == "linear" and picture.is_lossy:
-            raise UserError(f"{picture.path}: compressed with loss, no linear light; expected --values stored or srgb")
-        if values != "linear" and picture.is_linear:
-            raise UserError(f"{picture.path}: RAW files and floating point hold linear light; expected --values linear")
 
 
 def _in_part(records: list[dict[str, Any]]) -> Iterator[str]:

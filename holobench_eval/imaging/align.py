@@ -134,8 +134,8 @@ def align(capture: NDArray[np.floating], target: NDArray[np.floating], partly: b
     seen = f"the best correlation is {best:.2f}, and {ALIKE} is needed" if best > 0 else "nothing is alike"
     cut = "less than half of it is on the capture" if partly else "cut off"
     raise CellError(
-        f"the target is not found in the capture ({seen}): it shows another picture, or is too faint, too speckled or "
-        f"{cut}"
+        f"the target is not found in the capture ({seen}): it shows another picture, or is too faint, too speckled, "
+        f"stretched, turned by an angle or {cut}"
     )
 
 
@@ -253,6 +253,8 @@ def _proposals(frame: Frame, reference: Frame, partly: bool) -> Iterator[Warp]:
     shape = (reference.shape[0], reference.shape[1])
     yield from (_planar(shape, homography) for homography in by_features(frame, reference))
     yield from (_planar(shape, homography) for homography in by_templates(frame, reference, partly))
+    across, down = frame.shape[1] / shape[1], frame.shape[0] / shape[0]  # stretched to the whole capture
+    yield _planar(shape, np.array([[across, 0, across / 2 - 0.5], [0, down, down / 2 - 0.5], [0, 0, 1]]))
 
 
 def _planar(shape: tuple[int, int], homography: Array) -> Warp:

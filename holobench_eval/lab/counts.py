@@ -18,6 +18,7 @@ from .raw import read_raw
 # of cameras with a Bayer mosaic
 RAW_SUFFIXES = (".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".pef", ".raf", ".rw2", ".srw")
 NUMBERS = ".npy"
+LEAST, MOST = 1e-22, 1e15  # of floating point: beyond them single precision ends
 FORMATS = ("PNG", "TIFF", "BMP", "WEBP", "JPEG")
 RIGHT = "expected an 8-bit or 16-bit PNG or TIFF, gray or RGB, or a BMP, WebP or JPEG"
 
@@ -78,8 +79,12 @@ def _counts(values: NDArray[Any], **facts: bool) -> Counts:
     planes = values[None] if values.ndim == 2 else values.transpose(2, 0, 1)
     if values.dtype.kind == "u":
         white = float(np.iinfo(values.dtype).max)
-    elif not np.isfinite(white := float(values.max())) or not np.isfinite(values.min()):
-        raise PictureError("values that are NaN or infinite")
+    else:
+        low, white = float(values.min()), float(values.max())
+        if not np.isfinite(low + white):
+            raise PictureError("values that are NaN or infinite")
+        if white > 0 and not (white > LEAST and max(white, -low) < MOST):
+            raise PictureError(f"values from {low:.3g} to {white:.3g}, which no camera counts")
     return Counts(planes, white, np.zeros((1, 1, 1), np.float32), **facts)
 
 

@@ -23,6 +23,7 @@ STRONGEST_STEP = 32.0
 ORDER = [0, 0, 1, 1, 1, 0, 0, 0]  # of two kinds of picture
 LIT = 1.0  # seconds that show any picture
 SHALLOWEST = 15  # counts of a picture that tell how deep they are
+FEW = 0.01  # of the samples, which may be hot pixels where no more are at full scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,19 +163,20 @@ def auto_exposure(camera: Camera, plane: int) -> float:
         frame, real = exposed(camera, seconds, plane)
         # dark level and background; where it is not dark at all, the steps are only less exact
         dark, bright = np.percentile(frame, (1, PERCENTILE))
-        fill = float((bright - dark) / max(camera.white - dark, 1))
+        fill, full = float((bright - dark) / max(camera.white - dark, 1)), float(np.mean(frame >= camera.white))
         if fault := miscounted(frame, camera.white):
             raise DeviceError(f"{camera.name}: {fault}")
         if bright >= camera.white:
-            step = 1 / STRONGEST_STEP if np.mean(frame >= camera.white) > 0.1 else 0.25
+            step = 1 / STRONGEST_STEP if full > 0.1 else 0.25
         else:
             step = min(max(FILL / max(fill, 1e-6), 1 / STRONGEST_STEP), STRONGEST_STEP)
             if ACCEPTED[0] <= 1 / step <= ACCEPTED[1]:
                 return real
         if step < 1 and seconds <= shortest:
+            hot = f"; hot pixels, if the {full:.2%} at full scale are, its own software replaces" * (0 < full <= FEW)
             raise DeviceError(
                 f"{camera.name}: too much light even at its shortest exposure of {shortest:.2g} s; "
-                "lower the laser's power or add a filter"
+                f"lower the laser's power or add a filter{hot}"
             )
         if step > 1 and seconds >= longest:
             if fill >= DIMMEST:

@@ -386,3 +386,11 @@ def test_parts_are_ninths_and_hold_structure_above_a_level_of_eight_bits():
     flat[:30, 40:] += 0.002 * draw.choice([-1, 1], (30, 20)).astype(np.float32)
     assert structured(flat) == [(slice(30, 60), slice(0, 20))]
     assert structured(np.full((90, 60), 0.5, np.float32)) == []
+
+
+def test_a_target_that_is_stretched_over_the_whole_capture_is_found_in_full_speckle():
+    target = photograph("chelsea", (160, 200))
+    stretched = np.diag([2.4, 1.2, 1.0])
+    capture = captured(target, stretched, (192, 480), np.random.default_rng(3), contrast=1.0, grain=2.0)
+    found = align(capture, target).warp.corners()
+    assert np.abs(found - mapped(stretched, corners((160, 200)))).max() < 4

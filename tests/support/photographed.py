@@ -91,6 +91,11 @@ def captured(
     return np.round(np.clip(noisy, 0, 1) ** (1 / 2.2) * 255).astype(np.float32) / 255
 
 
+def unclipped(capture: Picture, draw: np.random.Generator) -> Picture:
+    """A capture whose brightest samples are not equal, as they are where a camera clips them."""
+    return np.where(capture < 0.85, capture, draw.uniform(0.6, 0.85, capture.shape)).astype(np.float32)
+
+
 def drowned(
     picture: Picture, homography: Array, size: tuple[int, int], draw: np.random.Generator, haze: float = 0.7
 ) -> Picture:

@@ -10,7 +10,8 @@ from ..errors import PictureError
 END = b"\x00\x00\x00\x00IEND\xaeB`\x82"  # the last chunk of every PNG, section 11.2.4
 SAMPLES = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # a pixel, by colour type, section 11.2.1
 PALETTE, ALPHA = 3, (4, 6)
-SRGB = b"\x01\x0d\x00\x01"  # of cICP: primaries and curve of sRGB, section 11.3.2.6
+# of cICP: primaries of sRGB and its curve or none, section 11.3.2.6
+SRGB, LINEAR = b"\x01\x0d\x00\x01", b"\x01\x08\x00\x01"
 # first row and column and steps between them of the pictures that an interlaced one consists of, section 8.1
 WHOLE = ((0, 0, 1, 1),)
 INTERLACED = ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2), (1, 0, 2, 1))
@@ -29,11 +30,13 @@ def refuse_short(content: bytes, width: int, height: int) -> None:
         raise PictureError("truncated or damaged: rows of the PNG are missing")
 
 
-def refuse_other_curve(content: bytes) -> None:
-    """PictureError for a PNG whose cICP, which stands above all other chunks on colour, says that it is not sRGB."""
-    curve = next((data for kind, data in _chunks(content) if kind == b"cICP"), SRGB)
-    if curve != SRGB:
+def has_curve(content: bytes, linear: bool) -> bool:
+    """Whether a PNG has a cICP, which stands above all else on colour. PictureError where it says neither sRGB nor, for
+    ``linear``, linear light."""
+    curve = next((data for kind, data in _chunks(content) if kind == b"cICP"), b"")
+    if curve and curve not in ((SRGB, LINEAR) if linear else (SRGB,)):
         raise PictureError(f"its cICP says {', '.join(map(str, curve[:4]))}, that of sRGB is 1, 13, 0, 1")
+    return bool(curve)
 
 
 def bare(content: bytes) -> bytes:

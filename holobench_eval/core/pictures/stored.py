@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -24,8 +25,12 @@ FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")  # no others: Pillow wou
 # 7680 x 4320, more than any panel shows; as linear light an image takes twelve bytes a pixel, and as much for a while.
 LARGEST_PIXELS = 33_177_600
 
-ORIENTATION = 274  # Exif 2.32, section 4.6.4
+ORIENTATION, EXIF, COLOUR_SPACE = 274, 0x8769, 0xA001  # Exif 2.32, sections 4.6.4 and 4.6.5
+EXIF_SRGB, UNCALIBRATED = 1, 65535  # of the last
 SRGB_GAMMA, LINEAR_GAMMA, SLACK = 0.45455, 1.0, 0.001  # of PNG's chunk gAMA, which writers round
+SRGB_PRIMARIES, APART = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06), 0.01  # x, y of white, red, green, blue
+STEPS = 18  # levels of each colour at which a profile is asked what it means
+SRGB_OFF, LINEAR_OFF = 3, 12  # levels of 255; a gamma of 2.2 is 9 off, and 8 bits of linear light in a gray profile 10
 # by Pillow's mode: channels without alpha; pictures of other modes are not gray and not RGB
 CHANNELS = {"1": 1, "L": 1, "I;16": 1, "LA": 1, "RGB": 3, "RGBA": 3, "P": 3, "PA": 3}
 
@@ -40,7 +45,8 @@ class Stored:
     format: one of `FORMATS`; width, height: as stored; channels: 1 or 3 (red, green, blue), those of its colours with
     a palette, without alpha; bits: of a sample, or of an index; is_floating: whether samples are floating point;
     has_palette, has_alpha; is_lossy: compressed with loss; orientation: by EXIF, 1 for upright; profile: the embedded
-    ICC profile; gamma: of PNG's gAMA, None without one; white_is_zero: a TIFF's samples fall with brightness.
+    ICC profile; gamma: of PNG's gAMA, None without one; primaries: x and y of white, red, green and blue, empty where
+    none are stated; colour_space: by EXIF; white_is_zero: a TIFF's samples fall with brightness.
     """
 
     content: bytes
@@ -56,28 +62,33 @@ class Stored:
     orientation: int = 1
     profile: bytes = b""
     gamma: float | None = None
+    primaries: tuple[float, ...] = ()
+    colour_space: int = EXIF_SRGB
     white_is_zero: bool = False
 
     def refuse_other_colours(self, linear: bool = False) -> None:
         """PictureError where the file says that its values are not sRGB; ``linear``: nor proportional to light.
 
-        Many programs call everything sRGB, so that linear values may be called so.
+        Many programs call everything sRGB, so that linear values may be called so. The first of cICP, the profile and
+        PNG's other chunks prevails.
         """
-        if self.format == "PNG":
-            png.refuse_other_curve(self.content)
+        if self.format == "PNG" and png.has_curve(self.content, linear):
+            return
         if self.profile:
-            try:
-                opened = ImageCms.ImageCmsProfile(io.BytesIO(self.profile))
-                description = " ".join(ImageCms.getProfileDescription(opened).split())
-            except (OSError, ImageCms.PyCMSError) as error:
-                right = "convert it to sRGB, or leave the profile out"
-                raise PictureError(f"its ICC colour profile cannot be read; {right}") from error
-            if "srgb" not in description.lower():
-                raise PictureError(f"its ICC colour profile is '{description[:60]}'; convert it to sRGB")
-        elif self.gamma is not None:  # over which a profile prevails
+            name, meant = _meaning(self.profile)
+            if "sRGB" in meant or (linear and "linear" in meant):
+                return
+            right = "whose curves or primaries are not those of sRGB; convert it to sRGB"
+            raise PictureError(f"its ICC colour profile is '{name[:60]}', {right}")
+        if self.gamma is not None:
             allowed = (SRGB_GAMMA, LINEAR_GAMMA) if linear else (SRGB_GAMMA,)
             if all(abs(self.gamma - right) > SLACK for right in allowed):
                 raise PictureError(f"its gAMA is {self.gamma:g}, that of sRGB {SRGB_GAMMA}; convert it to sRGB")
+        if self.channels == 3 and self.primaries and np.abs(np.subtract(self.primaries, SRGB_PRIMARIES)).max() > APART:
+            raise PictureError("its primaries or its white are not those of sRGB; convert it to sRGB")
+        if self.colour_space != EXIF_SRGB and not (linear and self.colour_space == UNCALIBRATED):
+            right = f"that of sRGB {EXIF_SRGB}, and it has no profile; convert it to sRGB"
+            raise PictureError(f"its EXIF colour space is {self.colour_space}, {right}")
 
     def values(self) -> NDArray[Any]:
         """``(H, W)`` or ``(H, W, 3)`` uint8, uint16, float32 or float64 as stored, red first, the larger the brighter.
@@ -122,7 +133,7 @@ def open_picture(content: bytes, largest: int = LARGEST_PIXELS) -> Stored:
             return stored
         with warnings.catch_warnings():
             # Pillow's own limit, which an importing program may have lifted, is only the first line.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(content), formats=FORMATS)
             _refuse_large(image.width, image.height, largest)
             return _stored(content, image)
@@ -158,6 +169,7 @@ def _stored(content: bytes, image: Image.Image) -> Stored:
     if form == "BMP":
         depth = content[28]  # BITMAPINFOHEADER, biBitCount: of a pixel
         bits = 5 if depth == 16 else min(depth, 8)
+    exif, colours = image.getexif(), {} if "srgb" in image.info else image.info  # that chunk stands above the others
     return Stored(
         content,
         form,
@@ -168,10 +180,38 @@ def _stored(content: bytes, image: Image.Image) -> Stored:
         has_palette=mode in ("P", "PA"),
         has_alpha=mode in ("LA", "PA", "RGBA"),
         is_lossy=form == "JPEG" or (form == "WEBP" and b"VP8L" not in content[:64]),
-        orientation=image.getexif().get(ORIENTATION, 1),
+        orientation=exif.get(ORIENTATION, 1),
         profile=image.info.get("icc_profile") or b"",
-        gamma=None if "srgb" in image.info else image.info.get("gamma"),  # the chunk sRGB stands above gAMA
+        gamma=colours.get("gamma"),
+        primaries=colours.get("chromaticity", ()),
+        colour_space=EXIF_SRGB if "srgb" in image.info else exif.get_ifd(EXIF).get(COLOUR_SPACE, EXIF_SRGB),
     )
+
+
+@lru_cache(maxsize=8)  # of the pictures of a folder
+def _meaning(profile: bytes) -> tuple[str, frozenset[str]]:
+    """The name of an ICC profile, and whether it means ``sRGB`` or ``linear`` light by what it makes of some colours.
+
+    Its name is no evidence: "Linear sRGB" is one.
+    """
+    try:
+        opened = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        name = " ".join(ImageCms.getProfileDescription(opened).split())
+        mode = {"RGB": "RGB", "GRAY": "L"}.get(opened.profile.xcolor_space.strip())
+        if mode is None:
+            return name, frozenset()
+        intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
+        way = ImageCms.buildTransform(opened, ImageCms.createProfile("sRGB"), mode, "RGB", renderingIntent=intent)
+    except (OSError, ImageCms.PyCMSError) as error:
+        right = "convert it to sRGB, or leave the profile out"
+        raise PictureError(f"its ICC colour profile cannot be read; {right}") from error
+    axis = np.linspace(0, 255, STEPS).round().astype(np.uint8)
+    colours = np.stack(np.meshgrid(axis, axis, axis) if mode == "RGB" else [axis[None]] * 3, axis=-1).reshape(1, -1, 3)
+    meant = np.asarray(ImageCms.applyTransform(Image.fromarray(colours).convert(mode), way), dtype=np.float64)
+    light = colours / 255
+    encoded = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    kinds = {"sRGB": (colours, SRGB_OFF), "linear": (encoded, LINEAR_OFF)}
+    return name, frozenset(kind for kind, (right, off) in kinds.items() if np.abs(meant - right).max() <= off)
 
 
 def _load(content: bytes) -> None:

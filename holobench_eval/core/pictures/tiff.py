@@ -86,6 +86,8 @@ def _facts(page: TiffPage) -> dict[str, Any]:
     orientation = page.tags.valueof("Orientation", 1)
     if orientation not in range(1, 9):
         raise PictureError(f"an image of orientation {orientation}; expected 1 to 8")
+    own = page.tags.valueof("PrimaryChromaticities")
+    ratios = (*page.tags.valueof("WhitePoint", (3127, 10000, 3290, 10000)), *own) if own else ()
     return {
         "width": page.imagewidth,
         "height": page.imagelength,
@@ -97,6 +99,8 @@ def _facts(page: TiffPage) -> dict[str, Any]:
         "is_lossy": page.compression in LOSSY,
         "orientation": orientation,
         "profile": page.iccprofile or b"",
+        "primaries": tuple(top / (bottom or 1) for top, bottom in zip(ratios[::2], ratios[1::2], strict=True)),
+        "colour_space": (page.tags.valueof("ExifTag") or {}).get("ColorSpace", 1),
         "white_is_zero": photometric == WHITE_IS_ZERO,
     }
 

@@ -113,7 +113,21 @@ def lacking(results: Results) -> str:
         said = f"Only the {have} ranked"
     else:
         said = "No method is ranked, since none has every target"
-    return f"{said}: {_first(who, LISTED)}. {_remedy(results, lacks)}"
+    common = _in_common(results, lacks) if results.layout.measure == FILES else ""
+    return f"{said}: {_first(who, LISTED)}. {_remedy(results, lacks)}{common}"
+
+
+def _in_common(results: Results, lacks: Lacks) -> str:
+    """How given photographs of two methods differ on the targets that both have, where one of them lacks some."""
+    display, total = results.conditions[0], len(results.targets)
+    labels = sorted(results.methods(display), key=lambda label: (label, display) in lacks)
+    first = results.layout.baseline or labels[0]
+    told = []
+    for label in labels:
+        if label != first and {(label, display), (first, display)} & lacks.keys():
+            found = results.estimate(results.values(label, display) - results.values(first, display))
+            told += [f"{label} {difference(results.headline, found)} on {found.n} of {total}"] if found.n else []
+    return f" Against {first}, on the targets that both have: {_first(told, LISTED)}." if told else ""
 
 
 def _of(missing: list[str], total: int) -> str:

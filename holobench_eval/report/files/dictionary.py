@@ -32,6 +32,7 @@ _KEYS = {
     "second_aligner_px": ("Most that a corner of the target lies elsewhere in the capture by a second aligner", "px"),
     "share_scored": ("Share of the target that is scored, which all its captures show", ""),
     "darkest": ("How much brighter the capture's darkest part is than the target's, in parts of its white", ""),
+    "odd_pixels": ("Samples of the capture that stand out from all around them, as hot and dead pixels do", ""),
     "share_seen": ("Share of the target that its capture shows", ""),
     "speckle_contrast": ("Standard deviation over mean of intensity in flat patches of the target", ""),
     "unexplained_by_target": ("Squared error of the capture that the target leaves, white being 1", _WHITE),
@@ -53,6 +54,7 @@ _VARIANTS = {
     "refined": ", after a rigid motion of at most 2 px and 0.1 degree",
     "infocus": ", of what is in focus at the plane",
     "second": ", by a second, independent registration",
+    "mended": ", without what stands out from all around it, as hot and dead pixels do",
 }
 _INTERVAL = f"{100 * LEVEL:.0f} % interval over clusters of targets"
 _STATISTICS = {

@@ -16,6 +16,8 @@ NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
 # Of white; constant light of so much leaves 26 dB. Real captures (Stanford 2021) have 2 to 5 %, simulated displays but
 # leto-hazy less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
 LIFTED = 0.05
+ELSEWHERE = 0.75  # target pixels; below, what interpolation does to noise is most of a difference in dB
+MATTERS = 0.1  # dB, by which what stands out alone changes a score; speckle that looks so changes it by up to 0.07
 NOISE = 1.25  # of the darkest hundredth of a capture, which noise puts below its black level
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
 
@@ -54,11 +56,34 @@ def doubts(records: Sequence[Record], folders: Folders, domain: str) -> Iterator
         )
     if clipped := [record for record in captures if (record.saturated or 0) > MOST_SATURATED]:
         shares = named([f"{_name(record)} {record.saturated:.2%}" for record in clipped])
-        yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at full scale: {shares}."
+        yield f"Clipped, with more than {MOST_SATURATED:.1%} of the scored samples at a highest value: {shares}."
+    yield from _odd(captures, folders, psnr)
+    if moved := [
+        (record, v) for record in captures if (v := record.values()).get("second_aligner_px", 0.0) > ELSEWHERE
+    ]:
+        seconds = named([f"{_name(record)} {v[f'{psnr}_second']:.2f} dB for {v[psnr]:.2f}" for record, v in moved])
+        yield f"A second aligner finds the target elsewhere, by more than {ELSEWHERE:g} of its pixels: {seconds}."
     given = [record for record in captures if record.capture["geometry"]["kind"] == "given"]
     if unlike := [record for record in given if record.capture["geometry"]["correlation"] < ALIKE_IN_POSE]:
         correlations = named([f"{_name(record)} {record.capture['geometry']['correlation']:.2f}" for record in unlike])
         yield f"Not alike pixel to pixel, with correlations below {ALIKE_IN_POSE:g}: {correlations}."
+
+
+def _odd(captures: Sequence[Record], folders: Folders, psnr: str) -> Iterator[str]:
+    """A sentence about captures whose scores depend on what a camera does and light does not."""
+    scores = [(record, record.values()) for record in captures]
+    gains = [(v[f"{psnr}_mended"] - v[psnr], record, v) for record, v in scores if f"{psnr}_mended" in v]
+    if not (odd := sorted((one for one in gains if one[0] > MATTERS), key=lambda one: -one[0])):
+        return
+    without = [f"{_name(r)} {v[psnr] + gain:.2f} dB for {v[psnr]:.2f} ({v['odd_pixels']:.0f})" for gain, r, v in odd]
+    dark = folders.captures[odd[0][1].label, odd[0][1].target].dark
+    linear = "" if odd[0][1].capture["values"] == "linear" else "save linear counts and "
+    remedy = f" To take hot ones off, {linear}give a dark frame and no level: --dark FILE."
+    remedy = "" if dark and dark.bias.size > 1 else remedy
+    yield (
+        "Pixels, rows or columns stand out from all around them, as hot, dead and mosaic ones of a camera do and light "
+        f"does not. They can turn the order of methods. PSNR without them, and how many: {named(without)}.{remedy}"
+    )
 
 
 def _although(picture: Picture) -> str:

@@ -57,13 +57,19 @@ def levels(plane: Frame, mask: Mask | None = None) -> Levels:
     return Levels(most, _between_ends(plane, bright)[0] if bright.any() else 0, top, full)
 
 
-def within(plane: Frame, warp: Warp) -> Levels:
-    """The levels of a capture's channel where it shows the target. A lamp or a date beside it adds none."""
+def area(plane: Frame, warp: Warp) -> tuple[tuple[slice, slice], Mask]:
+    """Where a capture's channel shows the target: rows and columns around it, and which of their pixels do."""
     corners = warp.corners()[[0, 1, 3, 2]]
     mask = cv2.fillConvexPoly(np.zeros(plane.shape, np.uint8), np.round(corners).astype(np.int32), (1,)).astype(bool)
     lowest, highest = np.floor(corners.min(0)).astype(int), np.ceil(corners.max(0)).astype(int)
     columns, rows = (slice(max(0, low), high + 2) for low, high in zip(lowest, highest, strict=True))
-    return levels(plane[rows, columns], mask[rows, columns])
+    return (rows, columns), mask[rows, columns]
+
+
+def within(plane: Frame, warp: Warp) -> Levels:
+    """The levels of a capture's channel where it shows the target. A lamp or a date beside it adds none."""
+    part, mask = area(plane, warp)
+    return levels(plane[part], mask)
 
 
 def refusal(pairs: Iterable[tuple[str, Levels, Levels]], aligned: bool) -> str:

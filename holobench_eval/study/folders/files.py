@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import UserError, listed, suggest
 from ...imaging.align import PLAIN, RESIZE
@@ -18,10 +20,11 @@ from .pictures import SUFFIXES, Picture, checked
 
 CAPTURE_SUFFIXES = (*SUFFIXES, NUMBERS, *RAW_SUFFIXES)
 NAMED = 3
+TOLD = 5  # faults that a line tells
 
 Key = tuple[str, str]  # method and name of the target
 AT_TARGET = (PLAIN, RESIZE, SAVE_TARGET)
-IN_FILE = "; save the"  # what a refusal says where a file has to be saved otherwise
+IN_FILE = ("; save the", "; expected")  # what a refusal says where a file has to be saved otherwise
 Hole = tuple[str, str, str, str]  # state, method, target, reason
 
 
@@ -29,27 +32,28 @@ Hole = tuple[str, str, str, str]  # state, method, target, reason
 class Folders:
     """The pictures to score.
 
-    targets: by name; captures: by method and name of the target; pairings: how each capture is compared with its
-    target; notes: sentences that a reader of the scores needs.
+    targets: by name; captures: by method and name of the target; unread: why others cannot be scored; pairings: how
+    each capture is compared with its target; notes: sentences that a reader of the scores needs.
     """
 
     targets: Mapping[str, Picture]
     captures: Mapping[Key, Picture]
+    unread: Mapping[Key, str]
     pairings: Mapping[Key, Pairing]
     notes: tuple[str, ...]
 
     @cached_property
     def methods(self) -> tuple[str, ...]:
         """The methods, by name."""
-        return tuple(sorted({method for method, _ in self.captures}))
+        return tuple(sorted({method for method, _ in (*self.captures, *self.unread)}))
 
 
 def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark | None = None) -> Folders:
     """Look at ``captures/<method>/<target>.png`` and ``targets/<target>.png``.
 
-    linear: captures are linear in light; dark: their counts without light. UserError, one line, for folders that are
-    missing or empty, files that are no pictures of the right kind, dark counts that do not fit, links that lead out of
-    the folder, a capture without a target of its name.
+    linear: captures are linear in light; dark: their counts without light. A capture that cannot be read, or that has
+    other values, is ``unread``. UserError, one line, for folders that are missing or empty, captures without a target
+    of their name and files in the wrong place, targets that cannot be used, and where no capture can be read.
     """
     target_paths = {path.stem: path for path in _pictures(targets, targets, "a target of each scene, <target>.png")}
     capture_paths = dict[Key, Path]()
@@ -58,20 +62,53 @@ def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark
         capture_paths |= {
             (folder.name, path.stem): path for path in _pictures(folder, captures, expected, CAPTURE_SUFFIXES)
         }
-    for (_, name), path in capture_paths.items():
-        if name not in target_paths:
-            twice = _twice(path, target_paths.values())
-            right = twice or f"{suggest(name, target_paths)}; rename it or take it away"
-            raise UserError(f"{path}: no target of this name in {targets}; {right}")
-    pictures = {name: checked(path) for name, path in target_paths.items()}
-    photographs = {key: checked(path, linear, dark) for key, path in capture_paths.items()}
-    if encoded := next((picture for picture in pictures.values() if picture.is_linear), None):
-        raise UserError(f"{encoded.path}: floating point; expected a target in sRGB, of 8 or 16 bits")
-    for picture in pictures.values():
-        if not lit(picture):
-            raise UserError(f"{picture.path}: black; expected a target with light in at least one of its colours")
+    _refuse(
+        f"{path}: no target of this name in {targets}; "
+        + (_twice(path, target_paths.values()) or f"{suggest(name, target_paths)}; rename it or take it away")
+        for (_, name), path in capture_paths.items()
+        if name not in target_paths
+    )
+    pictures, wrong = _read(target_paths, _target)
+    _refuse(wrong.values())
+    photographs, unread = _read(capture_paths, lambda path: _capture(path, linear, dark))
+    _refuse(unread.values() if not photographs else ())
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
-    return Folders(pictures, photographs, pairings, tuple(_notes(pictures, photographs, pairings)))
+    return Folders(pictures, photographs, unread, pairings, tuple(_notes(pictures, photographs, pairings)))
+
+
+def _read(paths: Mapping[Any, Path], read: Callable[[Path], Picture]) -> tuple[dict[Any, Picture], dict[Any, str]]:
+    """The pictures that can be read, and why others cannot."""
+    pictures, faults = {}, {}
+    for name, path in paths.items():
+        try:
+            pictures[name] = read(path)
+        except UserError as error:
+            faults[name] = str(error)
+    return pictures, faults
+
+
+def _target(path: Path) -> Picture:
+    picture = checked(path)
+    if picture.is_linear:
+        raise UserError(f"{path}: floating point; expected a target in sRGB, of 8 or 16 bits")
+    if not lit(picture):
+        raise UserError(f"{path}: black; expected a target with light in at least one of its colours")
+    return picture
+
+
+def _capture(path: Path, linear: bool, dark: Dark | None) -> Picture:
+    picture = checked(path, linear, dark)
+    if linear and picture.is_lossy:
+        raise UserError(f"{path}: compressed with loss, no linear light; expected --values stored or srgb")
+    if not linear and picture.is_linear:
+        raise UserError(f"{path}: RAW files and floating point hold linear light; expected --values linear")
+    return picture
+
+
+def _refuse(faults: Iterable[str]) -> None:
+    """UserError, one line, that tells several faults, if there are any."""
+    if found := list(faults):
+        raise UserError("; ".join([*found[:TOLD], *[f"and {len(found) - TOLD} more"] * (len(found) > TOLD)]))
 
 
 def _twice(capture: Path, targets: Iterable[Path]) -> str:
@@ -105,12 +142,13 @@ def _pictures(folder: Path, root: Path, what: str, suffixes: tuple[str, ...] = S
     paths = [path for path in _listed(folder, what) if path.suffix.lower() in suffixes]
     if not paths:
         raise UserError(f"{folder}: no pictures in it ({', '.join(suffixes)}); expected {what}")
-    stems = [path.stem for path in paths]
+    stems, faults = [path.stem for path in paths], []
     for path in paths:
-        if not path.resolve().is_relative_to(root.resolve()):
-            raise UserError(f"{path}: leads out of the folder {root}; put the picture itself there")
-        if stems.count(path.stem) > 1:
-            raise UserError(f"{path}: there is another picture named '{path.stem}' in this folder; keep one of them")
+        if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root)):  # resolve() trips over a loop
+            faults.append(f"{path}: leads out of the folder {root}; put the picture itself there")
+        elif stems.count(path.stem) > 1:
+            faults.append(f"{path}: there is another picture named '{path.stem}' in this folder; keep one of them")
+    _refuse(faults)
     return paths
 
 
@@ -186,4 +224,4 @@ def _kind(state: str, reason: str) -> str:
         return "missing"
     if any(text in reason for text in AT_TARGET):
         return "target"
-    return "file" if IN_FILE in reason else "photograph"
+    return "file" if any(text in reason for text in IN_FILE) else "photograph"

@@ -20,7 +20,8 @@ UNKNOWN = f"which gray picture was shown is not known; {SAVE_TARGET}"
 # ones (Stanford 2021) 0.88 to 0.93, and with red and blue exchanged the negative of that.
 EXCHANGED = -0.2
 COARSE = 36  # averages a side, in which speckle weighs little
-ALIKE = 0.25  # correlation of red and blue together, which an exchange leaves as it is
+ALIKE = 0.5  # correlation of red and blue together, which an exchange leaves as it is; 0.78 in full speckle and haze
+LIT = 0.05  # of the mean of the brightest channel: less is a colour that a target has not
 COLOURFUL = 0.05  # of the mean of a channel: least contrast of red less blue in a target that can tell
 NEARLY = "whose channels differ by a few levels of 255, as those of a gray picture that was saved as a JPEG in colour"
 
@@ -121,23 +122,32 @@ def exchange(image: Tensor, reference: Tensor) -> str:
     """
     if len(image) != 3:
         return ""
-    (seen, seen_sum), (wanted, wanted_sum) = (_of_red_and_blue(each) for each in (image, reference))
-    if float(wanted.std()) < COLOURFUL or _correlation(seen_sum, wanted_sum) < ALIKE:  # gray, or another picture
+    pictures = [_coarse(each) for each in (image, reference)]
+    means = [picture.mean((1, 2), keepdim=True).clamp_min(1e-12) for picture in pictures]
+    if float(means[1][[0, 2]].min() / means[1].max()) < LIT:  # a leak into a colour that the target has not is nothing
+        means = [mean.amax(0, keepdim=True).expand(3, -1, -1) for mean in means]
+    (red, _, blue), (red_wanted, _, blue_wanted) = (each / mean for each, mean in zip(pictures, means, strict=True))
+    seen, wanted = red - blue, red_wanted - blue_wanted
+    contrast = float(wanted.std())
+    if contrast < COLOURFUL or _correlation(red + blue, red_wanted + blue_wanted) < ALIKE:  # gray, or another picture
         return ""
-    if (correlation := _correlation(seen, wanted)) >= EXCHANGED:
+    correlation = _correlation(seen, wanted)
+    # Noise and a leak's own curve may correlate, but are small beside red less blue of the target.
+    if correlation >= EXCHANGED or correlation * float(seen.std()) / contrast >= EXCHANGED:
         return ""
+    poses = [turned for side in (seen, seen.T) for turned in (side, side.flip(0), side.flip(1), side.flip(0, 1))]
+    if any(_correlation(pose, wanted) > -correlation for pose in poses if pose.shape == wanted.shape):
+        return ""  # turned or mirrored, and not exchanged
     return (
         f"red and blue are exchanged in the capture or in its target (their difference correlates by {correlation:.2f})"
         "; save the wrong one with red first"
     )
 
 
-def _of_red_and_blue(image: Tensor) -> tuple[Tensor, Tensor]:
-    """Difference and sum of the outer channels ``(3, h, w)``, each over its mean, averaged over speckle."""
+def _coarse(image: Tensor) -> Tensor:
+    """A picture ``(3, h, w)`` averaged over speckle."""
     rows, columns = (min(COARSE, side) for side in image.shape[1:])
-    coarse = adaptive_avg_pool2d(image[None], (rows, columns))[0]
-    red, _, blue = coarse / coarse.mean((1, 2), keepdim=True).clamp_min(1e-12)
-    return red - blue, red + blue
+    return adaptive_avg_pool2d(image[None], (rows, columns))[0]
 
 
 def _correlation(first: Tensor, second: Tensor) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,8 +129,11 @@ def _light(counts: Counts, dark: Dark) -> Values:
 def _full(counts: Counts) -> float:
     """The value from which a sample is clipped: full scale, or the last level of fewer bits, if the highest is that.
 
-    Counts of 12 bits end at 4095 where they lie at the lower end of 16, and at 65520 at the upper one.
+    Counts of 12 bits end at 4095 where they lie at the lower end of 16, and at 65520 at the upper one. Floating point
+    has no full scale.
     """
+    if counts.values.dtype.kind == "f":
+        return math.inf
     highest = int(counts.values.max())
     if counts.values.dtype != np.uint16 or counts.is_raw or not highest:
         return 1.0

@@ -38,6 +38,7 @@ from .exposure import burnt, darkest
 from .files import Folders, Key
 from .pairing import exchange, too_few_levels
 from .pictures import Values
+from .sensor import clipped, mended
 from .visible import LEAST, Part, cropped, largest_part, part_of, share, shown
 
 LARGE = 2**21  # pixels of a target, those of 1080 x 1920
@@ -119,7 +120,7 @@ class Scoring:
 
     def alignments(self, step: Step) -> Alignments:
         """Every capture's own alignment, kept from an earlier run or computed."""
-        own: Alignments = {}
+        own: Alignments = {**self.folders.unread}
         for key, picture in self.folders.captures.items():
             step(f"aligning {key[0]}, {key[1]}")
             pairing = self.folders.pairings[key]
@@ -230,8 +231,8 @@ class Scoring:
         kept = self.store.read(digest(cell))
         drawn = kept is not None and figure.is_file() and self.store.thumbnail(kept.id).is_file()
         is_full = kept is not None and not identity.lacking(kept.scores, self.metrics)
-        if kept is not None and drawn and is_full and "darkest" in kept.values():
-            return kept  # and not of a version that did not look at the darkest part
+        if kept is not None and drawn and is_full and "odd_pixels" in kept.values():
+            return kept  # and not of a version that did not look for the camera's faults
         capture, target = self.loaded(key)
         warp = alignment.warp if part is None else cropped(alignment.warp, part)
         target = part_of(target, part)
@@ -239,10 +240,13 @@ class Scoring:
         raw = self.compared(key, picture.load())
         if too_few := too_few_levels(picture, self.folders.targets[name], raw, target, warp):
             return self.failed(cell, too_few)
-        saturated = float((sampled((raw >= picture.full).astype(np.float32), warp) > 0.5).mean())
+        saturated = float(clipped(raw, target, warp, picture.full).mean())
         if self.values == "linear" and saturated > MOST_SATURATED:
-            clipped = f"{saturated:.2%} of the scored samples are clipped, more than {MOST_SATURATED:.1%}"
-            return self.failed(cell, f"the capture is over-exposed: {clipped}")
+            much = f"{saturated:.2%} of the scored samples are clipped, more than {MOST_SATURATED:.1%}"
+            if clipped(mended(raw, warp)[0], target, warp, picture.full).mean() > MOST_SATURATED:
+                return self.failed(cell, f"the capture is over-exposed: {much}")
+            hot = f"{much}, and stand alone, as hot pixels do"
+            return self.failed(cell, f"{hot}; have the camera's software replace them, or expose for a shorter time")
         del raw
         frame = self.target_values(capture) if self.values == "srgb" else capture
         compared = torch.from_numpy(self.target_values(target))
@@ -252,8 +256,9 @@ class Scoring:
         if swapped := exchange(image, reference):
             return self.failed(cell, swapped)
         figures["darkest"] = darkest(self.as_light(image), self.as_light(reference))
-        del capture, frame, compared  # of a large picture, read again to be drawn
         scores = self.scores(image, reference, self.metrics)
+        figures |= self.without_faults(frame, compared, warp)
+        del capture, frame, compared  # of a large picture, read again to be drawn
         capture, _ = self.loaded(key)
         if self.visible:
             figures["share_seen"] = float(shown(alignment.warp, capture.shape[1:]).mean())
@@ -289,6 +294,19 @@ class Scoring:
         scores = score(image, compared, refine=False, blur=(), metrics=("psnr", "ssim"), stored=stored)
         seconds = {f"{name}_{self.domain}_second": scores[f"{name}_{self.domain}"] for name in ("psnr", "ssim")}
         return seconds | {"second_aligner_px": disagreement(first, other)}
+
+    def without_faults(self, frame: Values, compared: Tensor, warp: Warp) -> dict[str, float]:
+        """How many samples of a capture only its camera can have made, and the PSNR without them; arguments as above.
+
+        It is told beside the score, which stays.
+        """
+        better, odd = mended(self.as_light(torch.from_numpy(frame)).numpy(), warp)
+        if not odd:
+            return {"odd_pixels": 0.0}
+        stored = self.values == "stored"
+        image = sampled(srgb_encode(torch.from_numpy(better)).numpy() if stored else better, warp)
+        scores = score(torch.from_numpy(image), compared, refine=False, blur=(), metrics=("psnr",), stored=stored)
+        return {"odd_pixels": float(odd), f"psnr_{self.domain}_mended": scores[f"psnr_{self.domain}"]}
 
     def floor(self, name: str, part: Part | None) -> list[Record]:
         """The records of floor images."""

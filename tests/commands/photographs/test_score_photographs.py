@@ -1,6 +1,7 @@
 """``holoeval score`` on photographs as laboratories have them: one laser, too dark, cut off, speckled, aligned."""
 
 import io
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from PIL import Image, ImageCms
 from rich.console import Console
 
 from holobench_eval.commands.score import score_folders
@@ -18,7 +20,7 @@ from holobench_eval.metrics import score
 from holobench_eval.optics.colour import srgb_decode, srgb_encode
 from holobench_eval.study.folders import scoring as scored_pictures
 from tests.support.bayer import bayer_dng
-from tests.support.photographed import captured, drowned, few, photograph, pose, save
+from tests.support.photographed import captured, drowned, few, photograph, pose, save, unclipped
 from tests.support.reports import whole
 
 SHAPE = (160, 200)
@@ -158,7 +160,8 @@ def test_captures_that_are_mirrored_clipped_or_nearly_the_target_are_named_and_t
         draw = np.random.default_rng(5)
         where, size = pose(draw, SHAPE, scale=1.3)
         capture = captured(np.ascontiguousarray(shown), where, size, draw, contrast=0.2)
-        save(tmp_path / "captures" / method / "astronaut.png", np.clip(gain * capture, 0, 1))
+        capture = unclipped(capture, draw) if method == "fair" else np.clip(gain * capture, 0, 1)
+        save(tmp_path / "captures" / method / "astronaut.png", capture)
     for folder in ("targets", "captures/itself"):
         save(tmp_path / folder / "astronaut.png", target)
     save(tmp_path / "captures" / "padded" / "astronaut.png", np.pad(target, ((0, 0), (20, 20), (30, 30))))
@@ -257,7 +260,8 @@ def test_aligned_captures_that_are_not_alike_are_named_with_their_correlation(tm
 def test_red_and_blue_that_changed_places_have_no_score_but_a_reason(tmp_path, place, values):
     target = photograph("astronaut", SHAPE)
     save(tmp_path / "targets" / "astronaut.png", target)
-    seen = captured(target, np.eye(3), SHAPE, np.random.default_rng(3), contrast=0.5) * LASERS * 0.9
+    draw = np.random.default_rng(3)
+    seen = unclipped(captured(target, np.eye(3), SHAPE, draw, contrast=0.5), draw) * LASERS
     save(tmp_path / "captures" / "m" / "astronaut.png", seen)
     assert (run(tmp_path, values, aligned=True)[2]["state"] == "done").all()
     for path in (tmp_path / place).iterdir():
@@ -265,3 +269,119 @@ def test_red_and_blue_that_changed_places_have_no_score_but_a_reason(tmp_path, p
     records = run(tmp_path, values, aligned=True)[2]
     assert (records["state"] == "failed").all()
     assert records["reason"].str.contains("red and blue are exchanged in the capture or in its target").all()
+
+
+LIGHT = srgb_decode(torch.from_numpy(photograph("astronaut", (64, 80))[:1])).numpy()[0]
+
+
+def counts(root: Path, name: str, light: np.ndarray, method: str = "m") -> Path:
+    """A capture as 16-bit counts."""
+    path = root / "captures" / method / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), np.round(light * 65535).clip(0, 65535).astype(np.uint16))
+    return path
+
+
+def looped(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+BAD = {  # what is wrong with one capture of a folder, and what the hole says
+    "a link to itself": (looped, "a link that leads to no file"),
+    "damaged": (lambda path: path.write_bytes(path.read_bytes()[:300]), "truncated or damaged"),
+    "another size": (
+        lambda path: cv2.imwrite(str(path), np.arange(4800, dtype=np.uint16).reshape(60, 80)),
+        "aligned captures have the size",
+    ),
+    "compressed with loss": (lambda path: path.write_bytes(cv2.imencode(".jpg", 255 * LIGHT)[1]), "no linear light"),
+    "of another colour space": (
+        lambda path: Image.fromarray((255 * LIGHT).astype(np.uint8)).save(
+            path, icc_profile=ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
+        ),
+        "its ICC colour profile is",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two methods on six targets, the captures of which are of light."""
+    root = tmp_path_factory.mktemp("folder")
+    for index in range(6):
+        target = np.ascontiguousarray(photograph("coffee", (128, 160))[:1, 10 * index :, :][:, :64, :80])
+        save(root / "targets" / f"t{index}.png", target)
+        light = srgb_decode(torch.from_numpy(np.round(target * 255) / 255)).numpy()[0]
+        for method, contrast in (("a", 0.1), ("b", 0.2)):
+            noise = np.random.default_rng(index).standard_normal(light.shape)
+            counts(root, f"t{index}.png", 0.5 * light * (1 + contrast * noise).clip(0), method)
+    return root
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_one_bad_capture_is_a_hole_with_its_reason_and_the_others_are_compared(tmp_path, folder, what):
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    spoil, said = BAD[what]
+    spoil(tmp_path / "captures" / "a" / "t2.png")
+    text, _, records = run(tmp_path, "linear", aligned=True)
+    assert records["state"].value_counts().to_dict() == {"done": 11, "failed": 1}
+    assert said in records.loc[("a", "t2"), "reason"]
+    assert re.search(r"Against b, on the targets that both have: a \+[4-7]\.\d\d dB \[.*\] on 5 of 6", text)
+
+
+def test_all_bad_files_of_a_folder_are_told_at_once(tmp_path, folder):
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    for path in tmp_path.glob("captures/a/*"):
+        path.write_bytes(b"")
+    terminal = run(tmp_path, "linear", aligned=True)[2]["reason"].droplevel("label")
+    assert terminal.str.contains("not an image").sum() == 6
+    for path in tmp_path.glob("captures/b/*"):
+        path.write_bytes(b"")
+    with pytest.raises(UserError, match=r"a/t0.png: not an image.*a/t4.png: not an image.*; and 7 more$"):
+        run(tmp_path, "linear", aligned=True)
+    for name in ("t1", "t3"):
+        (tmp_path / "targets" / f"{name}.png").write_bytes(b"")
+    with pytest.raises(UserError, match=r"targets/t1.png: not an image.*targets/t3.png: not an image"):
+        run(tmp_path, "linear", aligned=True)
+    for name in ("t1", "t3"):
+        (tmp_path / "targets" / f"{name}.png").rename(tmp_path / "targets" / f"{name}x.png")
+    with pytest.raises(UserError, match=r"a/t1.png: no target.*a/t3.png: no target.*b/t1.png: no target"):
+        run(tmp_path, "linear", aligned=True)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e-300, 1e38])
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_no_camera_counts_are_refused_without_a_raw_warning(tmp_path, value):
+    save(tmp_path / "targets" / "t.png", photograph("astronaut", (64, 80))[:1])
+    (tmp_path / "captures" / "m").mkdir(parents=True)
+    scale = 1e-300 if abs(value) < 1 else 1.0
+    light = LIGHT.astype(np.float64)
+    np.save(tmp_path / "captures" / "m" / "t.npy", np.where(light < light.max(), scale * light, value))
+    with pytest.raises(UserError, match=r"values from .* to .*, which no camera counts"):
+        run(tmp_path, "linear", aligned=True)
+
+
+def test_hot_pixels_are_told_with_the_score_without_them_and_never_called_over_exposed(tmp_path):
+    target = (np.round(photograph("astronaut", (64, 80))[:1] * 255) / 255).astype(np.float32)
+    save(tmp_path / "targets" / "t.png", target)
+    light = srgb_decode(torch.from_numpy(target)).numpy()[0]
+    seen = 0.1 * light * (1 + 0.1 * np.random.default_rng(1).standard_normal(light.shape))
+    for method, every, level in (("good", 10**9, 0), ("hot", 2500, 0.9), ("full", 500, 1.0)):
+        counts(
+            tmp_path, "t.png", np.where(np.arange(light.size).reshape(light.shape) % every == 7, level, seen), method
+        )
+    _, terminal, records = run(tmp_path, "linear", aligned=True)
+    records = records.droplevel("target")
+    assert records["state"].to_dict() == {"good": "done", "hot": "done", "full": "failed"}
+    assert "stand alone, as hot pixels do; have the camera's software replace them" in records.loc["full", "reason"]
+    assert "over-exposed" not in records.loc["full", "reason"]
+    assert records.loc["hot", "psnr_linear_mended_db"] == pytest.approx(records.loc["good", "psnr_linear_db"], abs=0.3)
+    assert records.loc["hot", "psnr_linear_db"] < records.loc["good", "psnr_linear_db"] - 2
+    assert re.search(
+        r"PSNR without them, and how many: hot/t \d\d\.\d\d dB for .*\(6\)\. To take hot ones off, give a dark frame",
+        terminal,
+    )
+    assert "good/t" not in terminal
+    counts(tmp_path, "t.png", np.minimum(9 * seen, 0.61), "good")
+    reason = run(tmp_path, "linear", aligned=True)[2].loc[("good", "t"), "reason"]
+    assert "the capture is over-exposed" in reason

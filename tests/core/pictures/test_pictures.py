@@ -240,6 +240,105 @@ def test_a_profile_is_read_in_every_format(form: str) -> None:
         open_picture(written(IMAGE, form, icc_profile=b"no profile")).refuse_other_colours()
 
 
+PRIMARIES = {
+    "sRGB": [(0.4361, 0.2225, 0.0139), (0.3851, 0.7169, 0.0971), (0.1431, 0.0606, 0.7141)],
+    "Display P3": [(0.5151, 0.2412, -0.0011), (0.2920, 0.6922, 0.0419), (0.1571, 0.0666, 0.7841)],
+}
+AXIS = np.arange(1024) / 1023
+TABLE = np.where(AXIS <= 0.04045, AXIS / 12.92, ((AXIS + 0.055) / 1.055) ** 2.4)
+
+
+def fixed(*values: float) -> bytes:
+    return b"".join(struct.pack(">i", round(value * 65536)) for value in values)
+
+
+def curve(*values: int) -> bytes:
+    return b"curv" + bytes(4) + struct.pack(f">I{len(values)}H", len(values), *values)
+
+
+CURVES = {
+    "sRGB": b"para" + bytes(4) + struct.pack(">HH", 3, 0) + fixed(2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045),
+    "a table of sRGB": curve(*np.round(65535 * TABLE).astype(int)),
+    "linear": curve(),
+    "a gamma of 1": curve(256),
+    "a gamma of 1.8": curve(round(1.8 * 256)),
+    "a gamma of 2.2": curve(round(2.2 * 256)),
+}
+
+
+def profile(name: str, shape: bytes, primaries: str) -> bytes:
+    """An ICC profile of three primaries and a curve; without primaries one for gray."""
+    text = b"desc" + bytes(4) + struct.pack(">I", len(name) + 1) + name.encode() + bytes(79)
+    tags = [(b"desc", text), (b"cprt", b"text" + bytes(4) + b"none\0")]
+    tags += [(b"wtpt", b"XYZ " + bytes(4) + fixed(0.9642, 1.0, 0.8249))]
+    if primaries:
+        tags += [(b"rgb"[i : i + 1] + b"XYZ", b"XYZ " + bytes(4) + fixed(*PRIMARIES[primaries][i])) for i in range(3)]
+    tags += [(channel + b"TRC", shape) for channel in ([b"r", b"g", b"b"] if primaries else [b"k"])]
+    at, table, body = 132 + 12 * len(tags), b"", b""
+    for key, data in tags:
+        padded = data + bytes(-len(data) % 4)
+        table, body = table + key + struct.pack(">II", at + len(body), len(padded)), body + padded
+    head = struct.pack(">I4sI4s", at + len(body), b"none", 0x02100000, b"mntr") + (b"RGB " if primaries else b"GRAY")
+    head = (head + b"XYZ " + bytes(12) + b"acsp" + bytes(28) + fixed(0.9642, 1, 0.8249)).ljust(128, b"\0")
+    return head + struct.pack(">I", len(tags)) + table + body
+
+
+@pytest.mark.parametrize("primaries", ["sRGB", "Display P3", ""])
+@pytest.mark.parametrize("shape", CURVES)
+def test_a_profile_is_judged_by_its_curves_and_primaries_and_not_by_its_name(shape: str, primaries: str) -> None:
+    means = {"sRGB": "sRGB", "a table of sRGB": "sRGB", "linear": "linear", "a gamma of 1": "linear"}.get(shape, "")
+    means = "" if primaries == "Display P3" else means
+    for name in ("Linear sRGB", "sRGB IEC61966-2.1", "mine"):
+        image = IMAGE if primaries else IMAGE.convert("L")
+        stored = open_picture(written(image, "PNG", icc_profile=profile(name, CURVES[shape], primaries)))
+        for linear in (False, True):
+            if means == "sRGB" or (linear and means == "linear"):
+                stored.refuse_other_colours(linear)
+                continue
+            with pytest.raises(PictureError, match=f"'{name}', whose curves or primaries are not those of sRGB"):
+                stored.refuse_other_colours(linear)
+
+
+def with_exif(form: str, space: int, **options: object) -> bytes:
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA001] = space
+    return written(IMAGE, form, exif=exif.tobytes(), **options)
+
+
+@pytest.mark.parametrize("form", ["PNG", "TIFF", "JPEG", "WEBP"])
+def test_a_colour_space_in_exif_is_believed_where_no_profile_says_another(form: str) -> None:
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    for space, refused in ((1, ()), (2, (False, True)), (65535, (False,))):
+        open_picture(with_exif(form, space, icc_profile=srgb)).refuse_other_colours()
+        stored = open_picture(with_exif(form, space))
+        for linear in {False, True}.difference(refused):
+            stored.refuse_other_colours(linear)
+        for linear in refused:
+            with pytest.raises(PictureError, match=f"its EXIF colour space is {space}, that of sRGB 1"):
+                stored.refuse_other_colours(linear)
+
+
+def test_other_primaries_are_refused_in_colour_where_nothing_above_them_is_stated() -> None:
+    srgb, p3 = (
+        (31270, 32900, *xy)
+        for xy in ((64000, 33000, 30000, 60000, 15000, 6000), (68000, 32000, 26500, 69000, 15000, 6000))
+    )
+    tags = [[(318, 5, 2, _ratios(xy[:2]), True), (319, 5, 6, _ratios(xy[2:]), True)] for xy in (srgb, p3)]
+    for good in (with_chunk(b"cHRM", struct.pack(">8I", *srgb)), tiff(COLOUR, "contig", extratags=tags[0])):
+        open_picture(good).refuse_other_colours()
+    for other in (with_chunk(b"cHRM", struct.pack(">8I", *p3)), tiff(COLOUR, "contig", extratags=tags[1])):
+        with pytest.raises(PictureError, match="its primaries or its white are not those of sRGB"):
+            open_picture(other).refuse_other_colours()
+    open_picture(tiff(GRAY, "gray", extratags=tags[1])).refuse_other_colours()
+    above = chunk(b"sRGB", b"\0") + chunk(b"cHRM", struct.pack(">8I", *p3))
+    png = written(IMAGE, "PNG")
+    open_picture(png[:33] + above + png[33:]).refuse_other_colours()
+
+
+def _ratios(values: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(itertools.chain.from_iterable((value, 100000) for value in values))
+
+
 @pytest.mark.parametrize("form", ["PNG", "JPEG", "TIFF", "BMP", "WEBP"])
 @pytest.mark.parametrize("kept", [0.05, 0.9])
 def test_a_truncated_file_is_refused(form: str, kept: float) -> None:

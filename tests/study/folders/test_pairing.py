@@ -248,6 +248,42 @@ def test_exchanged_colours_are_told_from_right_ones_whatever_their_brightness(ga
     assert exchange(seen, gray) == exchange(gray, target) == exchange(seen[:1], target[:1]) == ""
 
 
+RED = np.stack([COLOUR[0], 0 * COLOUR[0], 0 * COLOUR[0]])
+LEAKS = {  # into blue, of what red sites see
+    "none": lambda red: 0 * red,
+    "in proportion": lambda red: 0.075 * red,
+    "less a threshold": lambda red: (0.05 * red - 0.003).clip(0),
+    "with a curve": lambda red: 0.075 * red**1.3,
+    "and noise": lambda red: 0.02 * red + 0.01 * np.random.default_rng(2).random(red.shape),
+}
+
+
+@pytest.mark.parametrize("lit", [0, 1, 2])
+@pytest.mark.parametrize("kind", LEAKS)
+def test_a_leak_into_a_colour_that_the_target_has_not_is_no_exchange_and_an_exchange_is(kind, lit):
+    target = torch.from_numpy(np.roll(RED, lit, axis=0))
+    seen = RED[0] * (1 + 0.2 * np.random.default_rng(1).standard_normal(RED[0].shape)).clip(0)
+    planes = torch.from_numpy(np.roll(np.stack([seen, 2 * LEAKS[kind](seen), LEAKS[kind](seen)]), lit, axis=0))
+    assert exchange(planes, target) == ""
+    assert (exchange(planes.flip(0), target) != "") == (lit != 1)  # green stays where it is
+
+
+POSES = [
+    lambda seen: seen.transpose(1, 2),
+    lambda seen: seen.flip(1),
+    lambda seen: seen.flip(2),
+    lambda seen: seen.rot90(1, (1, 2)),
+]
+
+
+@pytest.mark.parametrize("pose", range(4))
+@pytest.mark.parametrize("name", ["colorwheel", "retina", "astronaut", "hubble_deep_field"])
+def test_a_capture_in_another_pose_is_not_called_exchanged(name, pose):
+    target = torch.from_numpy(photograph(name, (128, 128)))
+    assert exchange(POSES[pose](target), target) == ""
+    assert exchange(target.flip(0), target) != ""
+
+
 def moved(x: float, y: float, shape: tuple[int, int] = (40, 60)) -> Warp:
     return Warp(shape, np.array([[2.0, 0, x], [0, 2, y], [0, 0, 1]]), np.zeros((6, 2)))
 
