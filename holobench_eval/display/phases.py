@@ -3,27 +3,39 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import Parameter
-from torch.nn.functional import avg_pool2d
+from torch.nn.functional import avg_pool2d, interpolate
 
 from ..core.errors import CellError
+from ..optics.angular_spectrum import angular_spectrum_phase
+from ..optics.convolution import frequencies, iris
 from ..optics.phase import FARTHEST, are_levels, farthest
-from .api import DisplaySpec
-from .nominal import ideal_light, nominal_levels
+from ..optics.phasor import phasor, squared_modulus
+from .api import DisplaySpec, Region
+from .nominal import ideal_light, nominal_levels, propagated
 
 # Correlations of an image with its target. On photographs, phases of the methods here have 0.97 and more; those that
 # were found with captures and make up for faults of a display have 0.82 and more, and 0.49 on leto-aged. No other pose,
 # sign or unit comes within 0.15 of these. Amplitudes in the place of phases have at most 0.37.
 RIGHT, BETTER, UNLIKE = 0.85, 0.1, 0.4
-GRAIN = 4  # pixels a side over which speckle is averaged
+FINE, COARSE = 2, 4
+GOOD = 0.97
+FARTHEST_FACTOR = 4.0
+NEAR = 0.03
+SPREADS = (16, 64, 128, 256)
+ORDER, ALL = "as if the lasers were in the order", "as if all lasers were of about"
 FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right phases too may come below UNLIKE
 JUMP = 10 * math.tau  # rad between neighbours, which radians, wrapped or smooth, have no need of
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
+CAUSES = "other optics, a correction map that is missing or left in, or faults of the display that it makes up for"
 FACTOR = "multiplied by"
 CLOSER = 0.7  # of the lack of correlation, to which a right factor brings a phase that makes its target without it
 TIE = 0.01  # by which a factor has to fit better than a unit, which it nearly is where the values fill the unit's span
@@ -38,6 +50,8 @@ UNITS = {  # what values in a span may be, and what makes radians of them
     (-180.0, 180.0): ("degrees", math.tau / 360),
     (-3600.0, 3600.0): ("degrees", math.tau / 360),  # of a phase that is not wrapped
 }
+COLOURS = ("red", "green", "blue")
+HALVES = {"halves": (-2, -1), "left and right halves": (-1,), "upper and lower halves": (-2,)}
 MIRRORED = {"": (), "mirrored left to right": (-1,), "mirrored top to bottom": (-2,), "turned by 180 degrees": (-2, -1)}
 
 
@@ -83,11 +97,11 @@ def check_radians(phase: Tensor, who: str) -> None:
         raise CellError(f"{who}phase has whole numbers up to {phase.max():g}: levels; expected radians, modulo 2 pi")
 
 
-def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
+def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = False) -> str:
     """What is odd about a phase, told from the nominal model, on which no fault of a display hides it.
 
-    A mirrored phase makes the mirrored image, so that poses cost nothing: a phase that makes its target takes one
-    propagation a colour, any other up to eight.
+    A phase that makes its target takes one propagation a colour, any other some dozens: what it may have been meant for
+    is tried in turn, see ``_meanings``. A mirrored phase makes the mirrored image, so that poses cost nothing.
 
     Parameters
     ----------
@@ -97,6 +111,8 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
         ``(C, h, w)`` linear light in [0, 1].
     spec
         The display's nominal optics.
+    seen
+        Whether captures of the display may have told how the phase makes up for faults of it.
 
     Returns
     -------
@@ -108,26 +124,125 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec) -> str:
     low, high = (float(value) for value in phase.aminmax())
     as_given = _fits(phase, target, spec)
     own = as_given.get("", 1.0)
-    if low == high or not as_given:
+    if low == high or own >= GOOD:
         return ""
-    if own >= RIGHT:  # a table of levels may fill no turn, and any other scale may then do a little more
-        return "" if spec.levels else _turn_doubt(phase, target, spec, own)
-    fits = [(fit, pose) for pose, fit in as_given.items()]
-    for how, values in {"with the opposite sign": -phase, "with red and blue exchanged": phase.flip(-3)}.items():
-        fits += _fits_of(how, values, target, spec)
-    for how, scale in _scales(phase).items():
+    fits = [
+        (fit, f"{how}, {pose}".strip(", "))
+        for how, values, optics in _meanings(phase, target, spec)
+        for pose, fit in _fits(values, target, optics).items()
         # An amplitude, or the magnitude of a phase, is somewhat like its target in any unit; the right unit is more.
-        fits += [each for each in _fits_of(how, scale * phase, target, spec) if each[0] >= RIGHT]
-    best, how = max(fits, key=lambda each: each[0] - TIE * each[1].startswith(FACTOR))
-    if best >= own + BETTER and best >= UNLIKE:
-        return _better(how, best, own)
-    correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have about 0.9"
-    if _is_amplitude(phase, target, spec):
+        if fit >= (RIGHT if how.startswith(("read", FACTOR)) else UNLIKE)
+    ]
+    best, how = max(fits, key=lambda each: round(each[0] - TIE * each[1].startswith(FACTOR), 3), default=(0.0, ""))
+    if 1 - best <= CLOSER * (1 - own):
+        return f"fits its target better {how} (correlation {best:.3f} on the nominal model; as it is, {own:.3f})"
+    back = propagated(spec.region.embed(target.sqrt(), spec.shape).to(torch.complex64), spec, back=True)
+    most = float(_compared(squared_modulus(propagated(back, spec)), target, spec, COARSE)[""].mean())
+    own = _fits(phase, target, spec, COARSE)[""]
+    correlation = f"correlation {own:.2f} with its target on the nominal model, where holograms have up to {most:.2f}"
+    if _is_amplitude(phase, back):
         return f"grows with the amplitude of the light that makes its target, and is not its phase ({correlation})"
+    if seen:
+        return ""
     if own < UNLIKE or unit_doubt(phase):
         like = "nothing like" if own < UNLIKE else "little of"
         return f"makes {like} its target (values from {low:.2f} to {high:.2f}; {correlation})"
+    if own < RIGHT * most:
+        return f"makes less of its target than a hologram for these optics does ({correlation}): {CAUSES}"
     return ""
+
+
+def _meanings(phase: Tensor, target: Tensor, spec: DisplaySpec) -> Iterator[tuple[str, Tensor, DisplaySpec]]:
+    """What a phase may have been meant for, in words, and the phase and the optics that then make its target."""
+    yield "with the opposite sign", -phase, spec
+    yield "", phase, spec
+    yield "with red and blue exchanged", phase.flip(-3), spec
+    rows, columns = (torch.arange(side) for side in spec.shape)
+    checkers = math.pi * ((rows[:, None] + columns) % 2)
+    for which, axes in HALVES.items():
+        halves = phase.roll([spec.shape[axis] // 2 for axis in axes], axes)
+        yield f"with its {which} exchanged (fftshift)", halves, spec
+    for how, values in {"": phase, " and its halves exchanged": halves}.items():
+        yield f"with half a turn added to every other pixel{how} (fftshift of the picture)", values + checkers, spec
+    down, right = _aside(phase, target, spec)
+    moved = phase.roll((-down, -right), (-2, -1))
+    if spec.plane == "fourier":
+        turns = math.tau * torch.tensor([spec.step(channel) for channel in range(len(target))])[:, None, None]
+        moved = phase - turns * (down * rows[:, None] + right * columns)
+    yield f"with its picture moved by {-down} rows and {-right} columns", moved, spec
+    yield from _geometries(phase, target, spec) if spec.plane == "fresnel" else ()
+    for how, scale in _scales(phase).items():
+        yield how, scale * phase, spec
+
+
+def _aside(phase: Tensor, target: Tensor, spec: DisplaySpec) -> tuple[int, int]:
+    """How many rows and columns the image is away from where its amplitudes correlate best with those of its target."""
+    amplitude, (height, width) = target.sqrt(), spec.shape
+    windows = torch.stack([amplitude - amplitude.mean((-2, -1), keepdim=True), torch.ones_like(amplitude)])
+    like, mean, power = torch.fft.rfft2(spec.region.embed(windows[[0, 1, 1]], spec.shape)).conj()
+    image = ideal_light(phase, spec)
+    like, mean, power = (
+        torch.fft.irfft2(torch.fft.rfft2(values) * window, s=spec.shape)
+        for values, window in ((image.sqrt(), like), (image.sqrt(), mean), (image, power))
+    )
+    spread = (power - mean**2 / amplitude[0].numel()).clamp_min(1e-6 * float(power.max()))
+    down, right = divmod(int((like / spread.sqrt()).sum(0).argmax()), width)
+    return (down + height // 2) % height - height // 2, (right + width // 2) % width - width // 2
+
+
+def _geometries(phase: Tensor, target: Tensor, spec: DisplaySpec) -> Iterator[tuple[str, Tensor, DisplaySpec]]:
+    """The three likeliest of other distances and lasers: peaks on a coarse grid, where they are wide, are followed to
+    finer ones. A pitch is a distance, and so is a wavelength: each colour has a curve, which lasers shift."""
+    waves = spec.wavelengths
+    orders = list(permutations(range(3)))[1:] if len(waves) == len(COLOURS) else []
+    lasers = {f"{ORDER} {', '.join(COLOURS[c] for c in order)}": tuple(waves[c] for c in order) for order in orders}
+    lasers |= {"": waves} | ({ALL: (waves[1],) * len(waves)} if orders else {})
+    steps, peaks = np.linspace(-1, 1, 25) * math.log(FARTHEST_FACTOR), []
+    for sign in (1, -1):
+        fits = _refocused(sign * phase, target, spec, SPREADS[0], steps)
+        curves = {pose: np.array([fit[pose].numpy() for fit in fits]).T for pose in fits[0]}
+        for (pose, colours), (name, others) in product(curves.items(), lasers.items()):
+            shifts = np.log(np.divide(others, waves))
+            curve = np.mean([np.interp(steps + d, steps, each) for d, each in zip(shifts, colours, strict=True)], 0)
+            peaks.append((curve.max(), steps[curve.argmax()], name, pose, sign))
+    for _, peak, name, pose, sign in sorted(peaks)[-3:]:
+        optics, width = replace(spec, wavelengths=lasers[name]), steps[1] - steps[0]
+        for spread in SPREADS[1:]:
+            near = peak + width * np.linspace(-1, 1, 7)
+            fits = _refocused(sign * phase, target, optics, spread, near)
+            peak, width = near[np.argmax([float(fit[pose].mean()) for fit in fits])], width / 3
+        factor, how = math.exp(peak), ["with the opposite sign"] * (sign < 0) + [name] * bool(name)
+        if name == ALL:
+            how[-1] += f" {factor * waves[1] * 1e9:.0f} nm"
+        elif abs(peak) > NEAR:
+            how.append(
+                f"at about {factor:.3g} times the distance, or for a pitch of {spec.pitch * 1e6 / factor**0.5:.3g} um"
+            )
+        else:
+            factor = 1.0
+        yield ", ".join(how), sign * phase, replace(optics, distance=factor * spec.distance)
+
+
+def _refocused(
+    phase: Tensor, target: Tensor, spec: DisplaySpec, spread: float, moves: Iterable[float]
+) -> list[dict[str, Tensor]]:
+    """The fits of the first frame, see ``_compared``, at exp(``moves``) times the distance, on a grid so coarse that
+    light spreads by so many of its pixels."""
+    finer = max(1.0, math.sqrt(max(spec.wavelengths) * spec.distance / (2 * spread)) / spec.pitch)
+    shape, old = (round(spec.shape[0] / finer), round(spec.shape[1] / finer)), spec.region
+    y, x = (few / many for few, many in zip(shape, spec.shape, strict=True))
+    top, left = math.ceil(old.top * y), math.ceil(old.left * x)
+    region = Region(top, left, int((old.top + old.height) * y) - top, int((old.left + old.width) * x) - left)
+    small = replace(spec, shape=shape, region=region)
+    wanted = region.crop(interpolate(old.embed(target, spec.shape)[None], shape, mode="area")[0])
+    rows, columns = (torch.fft.fftfreq(2 * side, 0.5 / side).long() for side in shape)
+    field = phasor(phase.new_ones(()), phase if phase.ndim == 3 else phase[0])
+    spectrum = torch.fft.fft2(field, s=[2 * side for side in spec.shape])[:, rows[:, None], columns]
+    fy, fx = frequencies((len(rows), len(columns)), spec.pitch / y)
+    passed = iris(fy, fx, spec.pitch, spec.pupil).float()
+    axial = torch.stack([angular_spectrum_phase(fy**2 + fx**2, wave, spec.distance) for wave in spec.wavelengths])
+    fields = (torch.fft.ifft2(spectrum * phasor(passed, (math.exp(move) * axial).float())) for move in moves)
+    return [_compared(squared_modulus(each[:, : shape[0], : shape[1]]), wanted, small) for each in fields]
 
 
 def _scales(phase: Tensor) -> dict[str, float | Tensor]:
@@ -152,30 +267,14 @@ def _turns(phase: Tensor) -> dict[str, float | Tensor]:
     return scales
 
 
-def _turn_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, own: float) -> str:
-    """Of a phase that makes its target, whether one that fills a turn makes it much better; empty where none does."""
-    fits = {how: _fits(scale * phase, target, spec)[""] for how, scale in _turns(phase).items()}
-    best = max(fits, key=fits.__getitem__, default="")
-    return _better(best, fits[best], own) if best and 1 - fits[best] <= CLOSER * (1 - own) else ""
-
-
-def _better(how: str, fit: float, own: float) -> str:
-    return f"fits its target better {how} (correlation {fit:.3f} on the nominal model; as it is, {own:.3f})"
-
-
-def _fits_of(how: str, phase: Tensor, target: Tensor, spec: DisplaySpec) -> list[tuple[float, str]]:
-    """The fits of values that were read otherwise, each with how, and with the pose."""
-    return [(fit, f"{how}, {pose}".removesuffix(", ")) for pose, fit in _fits(phase, target, spec).items()]
-
-
-def _is_amplitude(values: Tensor, target: Tensor, spec: DisplaySpec) -> bool:
-    """Whether values ``(C, H, W)`` are, in any unit, the amplitude of the target's light at the panel."""
-    pairs = []
-    for channel, plane in enumerate(target if values.ndim == 3 else ()):
-        field = spec.region.embed(plane.sqrt(), spec.shape).to(torch.complex64)
-        back = spec.propagator(channel).adjoint(field).abs()
-        pairs.append(torch.stack([values[channel].flatten(), back.flatten()]).corrcoef()[0, 1])
-    return bool(pairs) and float(torch.stack(pairs).nanmean()) >= RIGHT  # a colour without light has none
+def _is_amplitude(values: Tensor, back: Tensor) -> bool:
+    """Whether values ``(C, H, W)`` are, in any unit, the amplitude of the target's light at the panel, ``back``."""
+    if values.ndim == 4:
+        return False
+    pairs = [
+        torch.stack([one.flatten(), light.flatten().abs()]).corrcoef() for one, light in zip(values, back, strict=True)
+    ]
+    return float(torch.stack(pairs).nanmean(0)[0, 1]) >= RIGHT  # a colour without light has none
 
 
 def unit_doubt(phase: Tensor) -> str:
@@ -192,25 +291,37 @@ def unit_doubt(phase: Tensor) -> str:
     return f"has values from {low:.2f} to {high:.2f}, as {units[0]} have" if units else ""
 
 
-def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec) -> dict[str, float]:
+def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -> dict[str, float]:
     """The correlation of amplitudes of image and target, mean over colours, by the pose of the file; empty where the
-    target is even, or nearly so, in all colours."""
-    image = ideal_light(nominal_levels(phase, spec), spec)
-    poses = {name: image.flip(axes) for name, axes in MIRRORED.items()}
-    if spec.shape[0] == spec.shape[1]:
-        poses |= {f"transposed, {name}".removesuffix(", "): pose.mT for name, pose in poses.items()}
-    wanted = _structure(target, FAINT)
-    lit = wanted.norm(dim=1) > 0
+    target is even, or nearly so, in all colours. Of a panel of few levels, that of the phase or of its levels."""
+    lit = _structure(target, grain, FAINT).norm(dim=1) > 0
     if not lit.any():
         return {}
-    shown = {name: _structure(spec.region.crop(pose)) for name, pose in poses.items()}
-    return {name: float((made * wanted).sum(1)[lit].mean()) for name, made in shown.items()}
+    shown = [nominal_levels(phase, spec)]
+    shown += [phase] if shown[0] is not phase else []
+    made = [_compared(ideal_light(each, spec), target, spec, grain) for each in shown]
+    return {pose: max(float(fit[pose][lit].mean()) for fit in made) for pose in made[0]}
 
 
-def _structure(image: Tensor, faint: float = 0.0) -> Tensor:
+def _compared(image: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -> dict[str, Tensor]:
+    """The correlation of amplitudes of an entire image plane ``(C, H, W)`` with the target, a colour, by pose."""
+    poses = {name: image.flip(axes) for name, axes in MIRRORED.items()}
+    if spec.plane == "fourier":  # its middle is a pixel, where that of an even number of them lies between two
+        even = [1 - side % 2 for side in spec.shape]
+        poses = {
+            name: pose.roll([even[axis] * (axis in MIRRORED[name]) for axis in (-2, -1)], (-2, -1))
+            for name, pose in poses.items()
+        }
+    if spec.shape[0] == spec.shape[1]:
+        poses |= {f"transposed, {name}".removesuffix(", "): pose.mT for name, pose in poses.items()}
+    wanted = _structure(target, grain, FAINT)
+    return {name: (_structure(spec.region.crop(pose), grain) * wanted).sum(1) for name, pose in poses.items()}
+
+
+def _structure(image: Tensor, grain: int, faint: float = 0.0) -> Tensor:
     """Amplitudes ``(C, n)`` of an image ``(C, h, w)`` behind its speckle, of mean zero and norm one; zero where their
     contrast is at most ``faint``."""
-    coarse = avg_pool2d(image[None], GRAIN)[0].sqrt().flatten(1)
+    coarse = avg_pool2d(image[None], grain)[0].sqrt().flatten(1)
     mean = coarse.mean(1, keepdim=True)
     coarse = coarse - mean
     norm = coarse.norm(dim=1, keepdim=True)
