@@ -31,7 +31,7 @@ GOOD = 0.97  # fine: a fit that leaves nothing to be asked
 LEAST = {FINE: 0.9, COARSE: 0.95}  # of the fit that can be had
 UNLIKE = 0.4  # coarse; amplitudes in the place of phases have at most 0.37
 # The lack of correlation that another meaning leaves is at most so much of what there was: where it fits well, or not.
-RIGHT, CLOSER, MUCH_CLOSER = 0.85, 0.7, 0.35
+RIGHT, CLOSER, MUCH_CLOSER = 0.85, 0.5, 0.35
 MOST = math.log(4.0)  # of the factors of the distance that are tried, and of those that are told apart from 1
 NEAR = 0.03
 SPREADS = (16, 64, 128, 256)  # pixels
@@ -43,7 +43,7 @@ CAUSES = (
     "other optics, a correction map missing or left in, faults of a display that it makes up for, or a rough method"
 )
 FACTOR = "multiplied by"
-TIE = 0.01  # by which a factor has to fit better than a unit, which it nearly is where the values fill the unit's span
+TIE = 0.001  # by which a later meaning has to fit better, and a factor by ten times that: a unit is nearly one
 
 UNITS = {  # what values in a span may be, and what makes radians of them
     (0.0, 1.0): ("turns or amplitudes", math.tau),
@@ -58,7 +58,8 @@ UNITS = {  # what values in a span may be, and what makes radians of them
 COLOURS = ("red", "green", "blue")
 ORDERS = {", ".join(COLOURS[c] for c in order): order for order in list(permutations(range(3)))[1:]}
 HALVES = {"halves": (-2, -1), "left and right halves": (-1,), "upper and lower halves": (-2,)}
-MIRRORED = {"mirrored left to right": (-1,), "mirrored top to bottom": (-2,), "turned by 180 degrees": (-2, -1)}
+TURNED = "turned by 180 degrees"
+MIRRORED = {"mirrored left to right": (-1,), "mirrored top to bottom": (-2,), TURNED: (-2, -1)}
 
 
 def single(output: Tensor, channels: int) -> Tensor | None:
@@ -132,14 +133,16 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = F
     own = as_given.get("", 1.0)
     if low == high or own >= GOOD:
         return ""
-    fits = [
-        (fit, f"{how}, {pose}".strip(", "))
-        for how, values, optics in _meanings(phase, target, spec)
-        for pose, fit in _fits(values, target, optics).items()
+    best, how = 0.0, ""
+    for words, values, optics in _meanings(phase, target, spec):
         # An amplitude, or the magnitude of a phase, is somewhat like its target in any unit; the right unit is more.
-        if fit >= RIGHT or not how.startswith(("read", FACTOR))
-    ]
-    best, how = max(fits, key=lambda each: round(each[0] - TIE * each[1].startswith(FACTOR), 3), default=(0.0, ""))
+        least = RIGHT if words.startswith(("read", FACTOR)) or optics is not spec else 0.0
+        least = max(least, best + TIE * (10 if words.startswith(FACTOR) else 1))
+        fit, pose = max((fit, pose) for pose, fit in _fits(values, target, optics).items())
+        if fit >= least:
+            best, how = fit, f"{words}, {pose}".strip(", ")
+        if best >= GOOD and 1 - best <= MUCH_CLOSER * (1 - own):
+            break
     if 1 - best <= (CLOSER if best >= RIGHT else MUCH_CLOSER) * (1 - own):
         return f"fits its target better {how} (correlation {best:.3f} on the nominal model; as it is, {own:.3f})"
     back = propagated(spec.region.embed(target.sqrt(), spec.shape).to(torch.complex64), spec, back=True)
@@ -163,8 +166,8 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = F
 
 def _meanings(phase: Tensor, target: Tensor, spec: DisplaySpec) -> Iterator[tuple[str, Tensor, DisplaySpec]]:
     """What a phase may have been meant for, in words, and the phase and the optics that then make its target."""
-    yield "with the opposite sign", -phase, spec
     yield "", phase, spec
+    yield "with the opposite sign", -phase, spec
     for name, order in ORDERS.items() if len(target) == len(COLOURS) else ():
         others = [colour for colour, c in zip(COLOURS, order, strict=True) if colour != COLOURS[c]]
         how = f"{' and '.join(others)} exchanged" if len(others) == 2 else f"its colours in the order {name}"
@@ -182,9 +185,9 @@ def _meanings(phase: Tensor, target: Tensor, spec: DisplaySpec) -> Iterator[tupl
         turns = math.tau * torch.tensor([spec.step(channel) for channel in range(len(target))])[:, None, None]
         moved = phase - turns * (down * rows[:, None] + right * columns)
     yield f"with its picture moved by {-down} rows and {-right} columns", moved, spec
-    yield from _geometries(phase, target, spec) if spec.plane == "fresnel" else ()
     for how, scale in _scales(phase).items():
         yield how, scale * phase, spec
+    yield from _geometries(phase, target, spec) if spec.plane == "fresnel" else ()
 
 
 def _aside(phase: Tensor, target: Tensor, spec: DisplaySpec) -> tuple[int, int]:
@@ -219,7 +222,7 @@ def _geometries(phase: Tensor, target: Tensor, spec: DisplaySpec) -> Iterator[tu
             shifts = np.log(np.divide(others, waves))
             curve = np.mean([np.interp(steps + d, steps, each) for d, each in zip(shifts, colours, strict=True)], 0)
             peaks.append((curve.max(), steps[curve.argmax()], name, pose, sign))
-    for _, peak, name, pose, sign in sorted(peaks)[-3:]:
+    for _, peak, name, pose, sign in sorted(each for each in peaks if each[0] >= UNLIKE)[-3:]:
         optics, width = replace(spec, wavelengths=lasers[name]), steps[1] - steps[0]
         for spread in SPREADS[1:]:
             near = peak + width * np.linspace(-1, 1, 7)
@@ -319,10 +322,11 @@ def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -
 def _compared(image: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -> dict[str, Tensor]:
     """The correlation of amplitudes of an entire image plane ``(C, H, W)`` with the target, by pose: ``(C,)``, zero
     where the target is even, and so much more in other colours that the mean is theirs."""
-    # The middle of a Fourier plane is a pixel, where that of an even number of them lies between two.
+    # The middle of a Fourier plane is a pixel, where that of an even number of them lies between two; and a turn of half
+    # a circle is the opposite sign there.
     moved = {axis: int(spec.plane == "fourier" and spec.shape[axis] % 2 == 0) for axis in (-2, -1)}
     poses = {name: image.flip(axes).roll([moved[axis] for axis in axes], axes) for name, axes in MIRRORED.items()}
-    poses = {"": image} | poses
+    poses = {"": image} | {name: pose for name, pose in poses.items() if spec.plane != "fourier" or name != TURNED}
     if spec.shape[0] == spec.shape[1]:
         poses |= {f"transposed, {name}".removesuffix(", "): pose.mT for name, pose in poses.items()}
     wanted = _structure(target, grain, FAINT)
