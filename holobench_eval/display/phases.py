@@ -57,7 +57,7 @@ UNITS = {  # what values in a span may be, and what makes radians of them
 }
 COLOURS = ("red", "green", "blue")
 ORDERS = {", ".join(COLOURS[c] for c in order): order for order in list(permutations(range(3)))[1:]}
-HALVES = {"halves": (-2, -1), "left and right halves": (-1,), "upper and lower halves": (-2,)}
+HALVES = {"left and right halves": (-1,), "upper and lower halves": (-2,), "halves": (-2, -1)}
 TURNED = "turned by 180 degrees"
 MIRRORED = {"mirrored left to right": (-1,), "mirrored top to bottom": (-2,), TURNED: (-2, -1)}
 
@@ -322,8 +322,8 @@ def _fits(phase: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -
 def _compared(image: Tensor, target: Tensor, spec: DisplaySpec, grain: int = FINE) -> dict[str, Tensor]:
     """The correlation of amplitudes of an entire image plane ``(C, H, W)`` with the target, by pose: ``(C,)``, zero
     where the target is even, and so much more in other colours that the mean is theirs."""
-    # The middle of a Fourier plane is a pixel, where that of an even number of them lies between two; and a turn of half
-    # a circle is the opposite sign there.
+    # The middle of a Fourier plane is a pixel, where that of an even number of them lies between two, and half a turn
+    # about it is the opposite sign.
     moved = {axis: int(spec.plane == "fourier" and spec.shape[axis] % 2 == 0) for axis in (-2, -1)}
     poses = {name: image.flip(axes).roll([moved[axis] for axis in axes], axes) for name, axes in MIRRORED.items()}
     poses = {"": image} | {name: pose for name, pose in poses.items() if spec.plane != "fourier" or name != TURNED}
