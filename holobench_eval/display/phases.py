@@ -26,7 +26,7 @@ from .nominal import ideal_light, nominal_levels, propagated
 # fits better, coarse ones are free of speckle. Measured at 128 x 128 pixels on 5 photographs and 8 drawn pictures, the
 # phases of methods without a camera have 0.95 and more (fine, photographs) and 0.91 of what can be had (all); those
 # that were found with captures 0.7 and more (photographs). None of 661 right ones fitted better at another distance or
-# with other lasers; of 12 wrong ones of a kind (distance, pitch, order, pose, halves, place) each was named.
+# with other lasers; of 12 wrong ones of a kind (distance by 15 %, pitch, order, pose, halves, place) each was named.
 FINE, COARSE = 2, 4
 GOOD = 0.97  # fine: a fit that leaves nothing to be asked
 LEAST = {FINE: 0.9, COARSE: 0.95}  # of the fit that can be had
