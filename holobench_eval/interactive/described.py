@@ -15,6 +15,7 @@ TARGET: Final = "target, linear light in [0, 1]"
 CAPTURE: Final = "capture, linear light where 1 is a white pixel at full efficiency"
 IDEAL: Final = "image of the nominal model, intensity where 1 is the incident light"
 PHASE: Final = "phase [rad]"
+SEEN: Final = "phase [rad] for a display with faults"
 LONGEST = 1000  # numbers that are shown themselves, as NumPy does
 
 

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from ..core.errors import UserError
 from ..optics.colour import srgb_decode
-from .described import PHASE
+from .described import PHASE, SEEN
 
 Numbers = ArrayLike | Tensor
 FULL = {"uint8": 255, "uint16": 65535}  # scale of the levels of pictures
@@ -59,7 +59,7 @@ def _refuse_other_kind(values: object, what: str, right: str) -> None:
     """UserError for a path, and for an array of this package that is a phase in the place of light or the reverse."""
     is_path = isinstance(values, str | PurePath)
     kind = f"path '{values}'" if is_path else getattr(values, "what", "")
-    if is_path or (kind and (kind == PHASE) != (right == RADIANS)):
+    if is_path or (kind and (kind in (PHASE, SEEN)) != (right == RADIANS)):
         raise UserError(f"{what} that is the {kind}; expected {right}")
 
 

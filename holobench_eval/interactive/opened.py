@@ -26,7 +26,7 @@ from ..display.traits import refuse_plane, traits_of
 from ..lab.drivers.catalogue import adopted
 from ..study import opening
 from ..study.displays import Condition, condition, real_condition
-from .described import CAPTURE, IDEAL, PHASE, TARGET, Array, Described, described
+from .described import CAPTURE, IDEAL, PHASE, SEEN, TARGET, Array, Described, described
 from .given import LIGHT, RADIANS, Numbers, array_of, as_in_config, path_of, tensor_of, warn_of_levels, whole
 from .methods import method_of
 
@@ -110,9 +110,10 @@ class OpenDisplay:
             solver, label = build("methods", method, own, self._folder), method.rpartition(":")[2]
         else:
             solver, label = method_of(method, own)
-        if traits_of(solver, label).trains:
+        traits = traits_of(solver, label)
+        if traits.trains:
             raise UserError(f"method '{label}' has to be trained: name it in a study, and use holoeval run")
-        refuse_plane(traits_of(solver, label), label, self.spec)
+        refuse_plane(traits, label, self.spec)
         handle = self._bench.for_method(solver, label, light, _name(light), 0)
         try:
             with self._threads():
@@ -127,7 +128,7 @@ class OpenDisplay:
             found = tuple(output.shape) if isinstance(output, Tensor) else type_name(output)
             raise CellError(f"{label}: solve returned {found}, not a phase {(1, len(light), *self.spec.shape)}")
         check_phase(phase, self.spec, label)
-        return described(phase.detach().cpu().numpy(), PHASE)
+        return described(phase.detach().cpu().numpy(), SEEN if traits.sees or traits.simulates else PHASE)
 
     def capture(self, phase: Numbers, target: Numbers, repeat: int = 0) -> Array:
         """Show a phase, photograph it and bring the capture into the frame of the target.
@@ -154,7 +155,7 @@ class OpenDisplay:
             The camera cannot be registered.
         """
         light, shown = self._target(target), self._phase(phase)
-        if doubt := phase_doubt(shown, light, self.spec):
+        if doubt := phase_doubt(shown, light, self.spec, getattr(phase, "what", "") == SEEN):
             warnings.warn(f"the phase {doubt}", stacklevel=2)
         with self._threads():
             taken = self._bench.photograph(shown, light, _name(light), whole(repeat, "repeat"))

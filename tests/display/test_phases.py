@@ -4,6 +4,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +19,8 @@ from typer.testing import CliRunner
 import holobench_eval as hb
 from holobench_eval.commands import app
 from holobench_eval.core.errors import CellError
-from holobench_eval.display import load_profile
+from holobench_eval.display import DisplaySpec, load_profile, phases
+from holobench_eval.display.nominal import ideal_light
 from holobench_eval.display.phases import check_phase, phase_doubt, unit_doubt
 from holobench_eval.optics.phase import FARTHEST
 
@@ -31,12 +33,39 @@ OPEN |= {"wirtinger": FEW, "sgd": FEW, "multi_plane": FEW}
 OPEN |= {"wirtinger smooth": {"iterations": 100, "initial_phase": "constant"}}
 
 
+def optics(spec: DisplaySpec, factor: float = 1.0, order: tuple[int, ...] = (0, 1, 2)) -> DisplaySpec:
+    """A display that a phase for ``factor`` times its distance and lasers in that order suits not, nor one of its."""
+    return replace(spec, distance=spec.distance / factor, wavelengths=tuple(spec.wavelengths[c] for c in order))
+
+
+GEOMETRIES = {  # of the display, what the phase is for beside it, and by which method
+    "nearer": (
+        "double_phase",
+        lambda spec: optics(spec, 0.85),
+        r"at about 0.8[345]\d* times the distance, or for a pitch",
+    ),
+    "further": ("gerchberg_saxton", lambda spec: optics(spec, 1.35), r"at about 1.3[456]\d* times the distance, or"),
+    "a pitch": (
+        "gerchberg_saxton",
+        lambda spec: replace(spec, pitch=spec.pitch * 6.4 / 3.74),
+        r"at about [23]\.\d* times the distance, or for a pitch of [67]\.\d* um",
+    ),
+    "blue first": (
+        "double_phase",
+        lambda spec: optics(spec, order=(2, 1, 0)),
+        "the lasers were in the order blue, green",
+    ),
+    "green first": ("gerchberg_saxton", lambda spec: optics(spec, order=(1, 0, 2)), "in the order green, red, blue"),
+}
+
+
 def by_colour(phase: Tensor, *factors: float) -> Tensor:
     return torch.tensor(factors)[:, None, None] * phase
 
 
 DEGREES, LEVELS, DRAW = np.degrees(1.0), 255.99 / TAU, torch.Generator()
 TURNS = TAU * torch.tensor([-1.0, 0.0, 1.0])[:, None, None]
+CHECKERS = math.pi * ((torch.arange(128)[:, None] + torch.arange(128)) % 2)
 ODD = {
     "the other sign": (lambda phase: -phase, "fits its target better with the opposite sign (correlation"),
     "left to right": (lambda phase: phase.flip(-1), "better mirrored left to right"),
@@ -62,6 +91,16 @@ ODD = {
         "multiplied by 1.28, 1.6, 2, colour",
     ),
     "turns of red and blue": (lambda phase: by_colour(phase, 22 / 15, 1.0, 15 / 22), "by another two_pi_level (corr"),
+    "green first": (lambda phase: phase[[1, 0, 2]], "better with red and green exchanged"),
+    "blue, red, green": (lambda phase: phase[[2, 0, 1]], "with its colours in the order green, blue, red"),
+    "halves": (lambda phase: phase.roll((64, 64), (-2, -1)), "better with its halves exchanged (fftshift)"),
+    "left and right": (lambda phase: phase.roll(64, -1), "better with its left and right halves exchanged"),
+    "the picture's halves": (lambda phase: phase + CHECKERS, "half a turn added to every other pixel (fftshift of"),
+    "all halves": (
+        lambda phase: phase.roll((64, 64), (-2, -1)) + CHECKERS,
+        "every other pixel and its halves exchanged",
+    ),
+    "aside": (lambda phase: phase.roll((3, -2), (-2, -1)), "with its picture moved by -3 rows and 2 columns"),
     "noise": (lambda phase: 6 * torch.rand(phase.shape, generator=DRAW.manual_seed(1)), "makes nothing like"),
 }
 
@@ -96,6 +135,64 @@ def test_what_fits_better_is_named(display: hb.OpenDisplay, target: Tensor, phas
         assert remark in phase_doubt(change(phase), target, display.spec), kind
     even = torch.arange(3.0)[:, None, None].expand(3, *PANEL)
     assert phase_doubt(even, target, display.spec).startswith("makes nothing like its target")
+
+
+@pytest.mark.parametrize("kind", GEOMETRIES)
+def test_optics_that_a_phase_was_made_for_are_named(display: hb.OpenDisplay, target: Tensor, solved, kind: str) -> None:
+    method, change, remark = GEOMETRIES[kind]
+    assert re.search(remark, phase_doubt(solved(method), target, change(display.spec)))
+
+
+def test_a_distance_is_named_beside_a_sign_and_a_pose_and_one_laser_for_all(display, target, solved) -> None:
+    nearer = optics(display.spec, 0.8)
+    remark = phase_doubt(-solved("double_phase").flip(-1), target, nearer)
+    assert re.search(r"opposite sign, at about (0.79|0.8)\d* times the distance, .*, mirrored left to right", remark)
+    red = solved("double_phase")[:1].expand(3, -1, -1)
+    assert "as if all lasers were of about 6" in phase_doubt(red, target[:1].expand(3, -1, -1), display.spec)
+
+
+def test_what_has_no_name_is_told_by_its_correlation_unless_the_display_was_seen(display, target, phase) -> None:
+    y, x = torch.meshgrid(*2 * [torch.linspace(-1, 1, PANEL[0])], indexing="ij")
+    bent = phase + 2 * TAU * (torch.sin(2 * x + y) - x * y)  # a correction map
+    said = phase_doubt(bent, target, display.spec)
+    assert re.match(r"makes its target less well than phases for these optics can \(correlation 0\.\d\d with", said)
+    assert phase_doubt(bent % TAU, target, display.spec, seen=True) == ""
+
+
+def test_a_right_phase_takes_one_propagation(display, target, solved, monkeypatch) -> None:
+    taken = []
+    monkeypatch.setattr(phases, "ideal_light", lambda *given: taken.append(given) or ideal_light(*given))
+    assert phase_doubt(solved("double_phase"), target, display.spec) == ""
+    assert len(taken) == 1
+
+
+def test_a_phase_is_right_whose_levels_a_panel_lacks() -> None:
+    opened = hb.open_display("flc-1bit", panel=PANEL)
+    target = torch.from_numpy(opened.target(data.coffee()))
+    found = torch.from_numpy(opened.solve("double_phase", target))
+    assert phase_doubt(found, target, opened.spec) == ""
+    assert "opposite sign" in phase_doubt(-found, target, opened.spec)
+
+
+FOURIER = {  # each by its number of pixels a side
+    "right": (lambda phase, n: phase, ""),
+    "the other sign": (lambda phase, n: -phase, "better with the opposite sign (c"),
+    "left to right": (lambda phase, n: phase.flip(-1), "better mirrored left to right (c"),
+    "halves": (lambda phase, n: phase.roll((n // 2, n // 2), (-2, -1)), "with its halves exchanged (fftshift)"),
+    "rows": (lambda phase, n: phase.roll(n // 2, -2), "with its upper and lower halves exchanged"),
+    "the picture's halves": (lambda phase, n: phase + CHECKERS.repeat(2, 2), "half a turn added to every other pixel"),
+    "a pixel aside": (lambda phase, n: phase + math.pi * torch.arange(n) / n, "moved by 0 rows and -1 columns"),
+    "above": (lambda phase, n: (phase - math.tau * torch.arange(n)[:, None] / n) % TAU, "by 2 rows and 0 columns"),
+}
+
+
+def test_what_goes_wrong_before_a_lens_is_named() -> None:
+    opened = hb.open_display("pluto-fourier", panel=(256, 256))
+    target = torch.from_numpy(opened.target(data.coffee()[..., 1]))
+    found = torch.from_numpy(opened.solve("gerchberg_saxton", target))
+    for kind, (change, remark) in FOURIER.items():
+        said = phase_doubt(change(found, 256), target, opened.spec)
+        assert remark in said if remark else said == "", kind
 
 
 @pytest.mark.parametrize("method", ["double_phase", "gerchberg_saxton", "wirtinger smooth"])
@@ -159,6 +256,17 @@ def test_nothing_is_said_where_there_is_nothing_to_compare_or_no_light(display, 
     red = target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
     assert phase_doubt(phase, red, display.spec) == ""
     assert "opposite sign" in phase_doubt(-phase, red, display.spec)
+
+
+def test_a_phase_that_was_found_with_the_camera_is_not_warned_of() -> None:
+    opened = hb.open_display("leto-aged", panel=PANEL)
+    target = opened.target(data.coffee())
+    found = opened.solve("online_camera", target, captures=12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        opened.capture(found, target)
+    with pytest.warns(UserWarning, match="the phase makes|the phase fits"):
+        opened.capture(-found, target)
 
 
 class Spy(torch.Tensor):

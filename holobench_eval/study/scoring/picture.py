@@ -56,8 +56,8 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
     refuse_saturated(capture)
     keep_pictures(job, cell, capture.image, target, solved.phase)
     keep_capture(job, cell, capture.image, lasting=display.real is not None)
-    timed = isolation.traits(cell.method, job.setting.study.folder).timed
-    is_own = timed and plugins.is_shipped("methods", cell.method)  # none of those here has a doubtful phase
+    traits = isolation.traits(cell.method, job.setting.study.folder)
+    is_own = traits.timed and plugins.is_shipped("methods", cell.method)  # none of those here has a doubtful phase
     looked_at = not is_own and cell.measure == "picture"  # else the phase is for other planes, too
     return job.record(
         cell,
@@ -72,10 +72,10 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
         saturated=capture.saturated,
         learned=account(job.learned(job.task.preparation)),
         stopped=solved.stopped,
-        remark=phase_doubt(solved.phase, target, display.spec) if looked_at else "",
+        remark=phase_doubt(solved.phase, target, display.spec, traits.sees or traits.trains) if looked_at else "",
         reads=solved.covered,
         uncovered=solved.uncovered,
-        **asdict(solved.cost) if timed else {},
+        **asdict(solved.cost) if traits.timed else {},
     )
 
 
