@@ -71,6 +71,8 @@ class Processor(TorchDispatchMode):
         result = func(*args, **(kwargs or {}))
         name = func.overloadpacket.__name__
         kind = _KINDS.get(name if name in _KINDS else name.removesuffix("_"))  # one that works in place
+        if name == "pow" and isinstance(args[1], int | float) and args[1] in (0.5, 1, 2):  # rounded alike everywhere
+            return result
         if kind and (kind != "complex" or any(isinstance(each, Tensor) and each.is_complex() for each in args)):
             for part in result if isinstance(result, tuple | list) else (result,):
                 if isinstance(part, Tensor) and not (name in ("sum", "mean") and args[0].numel() <= FEW * part.numel()):
