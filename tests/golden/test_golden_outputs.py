@@ -15,17 +15,22 @@ from holobench_eval.display.simulated.stages.sensor import Sensor
 from holobench_eval.display.training import TrainingBench
 from holobench_eval.imaging import align as aligning
 from holobench_eval.methods import descent
+from holobench_eval.methods.onepass import training
 from holobench_eval.metrics import protocol
 from tests.golden import outputs
-from tests.golden.outputs import FILE, cases, complaint, recorded
+from tests.golden.outputs import FILE, PICTURES, SETTINGS, cases, complaint, recorded, share
 
 CASES = cases()
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_numbers_are_those_of_the_declared_version(name: str) -> None:
-    problem = complaint(name, CASES[name], CASES[name].numbers(), recorded().get(name))
+    numbers, entry = CASES[name].numbers(), recorded().get(name)
+    problem = complaint(name, CASES[name], numbers, entry)
     assert problem is None, problem
+    assert entry is not None
+    for part in numbers:  # told by how much, which `tests.processors` asks for
+        assert share(CASES[name], numbers[part], entry["numbers"][part]) <= 1
 
 
 def test_the_file_holds_what_ships_and_nothing_else() -> None:
@@ -73,6 +78,10 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(torch.optim, "Adam", Faster)
     begin = descent.Adam.__init__
     patch.setattr(descent.Adam, "__init__", lambda self, phase, rate: begin(self, phase, 1.01 * rate))
+    later = descent.Adam.set_rate
+    patch.setattr(descent.Adam, "set_rate", lambda self, rate: later(self, 1.01 * rate))
+    decay = training.cosine_decay
+    patch.setattr(training, "cosine_decay", lambda step, progress: 1.01 * decay(step, progress))
 
 
 @pytest.mark.parametrize(
@@ -84,7 +93,8 @@ def _other_step(patch: pytest.MonkeyPatch) -> None:
         ("method double_phase", _longer_wave),
         ("method wirtinger", _other_step),
         ("method hil", _brighter_training),
-        ("method hybrid_model", _other_step),
+        ("method twin", _other_step),
+        *((f"method {name}", _other_step) for name in sorted({*SETTINGS, *PICTURES}) if f"method {name}" in CASES),
     ],
 )
 def test_a_small_change_is_found(name, change: Callable[[pytest.MonkeyPatch], None], monkeypatch) -> None:

@@ -93,10 +93,10 @@ SHORT_OPEN_LOOP = tuple(
 )
 
 
-def quick(name: str) -> Any:
-    """A shipped method with short settings."""
+def quick(name: str, **other: Any) -> Any:
+    """A shipped method with short settings, and others in their place."""
     settings = {"file": str(_fields() / "{target}.npy")} if name == "phases" else QUICK.get(name, {})
-    return plugins.build("methods", name, settings)
+    return plugins.build("methods", name, {**settings, **other})
 
 
 @cache
