@@ -54,13 +54,13 @@ def write_report(
     known: its provenance; keep_pictures: see build_report.
     """
     from ..report import build_report
-    from ..report.data.phrases import uncovered
+    from ..report.data.phrases import edited, uncovered
 
     written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
     print_answer(console, results)
     print_holes(console, results)
-    if text := uncovered(records):
+    for text in filter(None, [uncovered(records), edited(records)]):
         console.print(text, markup=False, soft_wrap=True)
     files = (written, written.with_suffix(".html"), output / "table.csv", output / "records.csv")
     if not output.name.startswith("."):  # of a command that leaves some of them elsewhere

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import field, fields, is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
@@ -67,7 +68,9 @@ def find(kind: Kind, name: str, folder: Path | None = None) -> type[Any]:
     if name not in entries:
         raise UserError(f"unknown {kind[:-1]} '{name}'; {suggest(name, entries)}, or path/to/file.py:Name")
     try:
-        return _plugin_class(kind, name, entries[name].load())
+        with nullcontext() if is_shipped(kind, name) else sources.imports_recorded():
+            loaded = entries[name].load()
+        return _plugin_class(kind, name, loaded)
     except (ImportError, AttributeError) as error:
         raise UserError(f"{kind[:-1]} '{name}' cannot be imported: {error}") from error
 

@@ -1,17 +1,19 @@
-"""Which files a process opens for reading.
+"""Which files a process opens for reading, and what else it asks of its surroundings.
 
 An audit hook sees ``open`` in Python and in all that is written in it: NumPy, Pillow, SciPy, pandas, ``torch.load``,
-imports. C code that opens a file by itself is not seen: h5py, pyarrow, safetensors, ctypes. Of what this package
-brings along, `SILENT` announces such functions. Neither are files whose names alone are listed or looked up.
+imports; and listings of folders. C code that opens a file by itself is not seen: h5py, pyarrow, safetensors, ctypes.
+Of what this package brings along, `SILENT` announces such functions.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import site
 import sys
 import sysconfig
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -22,13 +24,26 @@ from types import FrameType
 from typing import Any
 from unittest.mock import patch
 
-from .hashing import State, file_state
+from .hashing import ABSENT, State, digest, file_digest, file_state
 
 PACKAGE = __package__.partition(".")[0]
 PATHS = {"open": 0, "import": 1, "ctypes.dlopen": 0, "sqlite3.connect": 0}  # events, and which argument is a path
-PROCESSES = ("subprocess.Popen", "os.posix_spawn", "os.exec", "os.system", "os.fork")
+LISTINGS = ("os.listdir", "os.scandir")
 STARTED = "what programs and processes read that it starts"
-SILENT = {"cv2": ("imread", "imreadmulti"), "torch": ("from_file",), "torch.jit": ("load",)}
+PROCESSES = ("subprocess.Popen", "os.posix_spawn", "os.exec", "os.system", "os.fork")
+UNSEEN = {**dict.fromkeys(PROCESSES, STARTED), "socket.connect": "what others send to it"}
+EVENTS = {*PATHS, *LISTINGS, *UNSEEN}
+SILENT = {  # by module, how functions begin
+    "cv2": ("imread",),
+    "torch": ("from_file",),
+    "torch.jit": ("load",),
+    "kornia_rs": ("read_image",),
+    "kornia_rs.io": ("read_image",),
+    "os": ("stat", "lstat", "access"),
+}
+IMPORTS = ("importlib._bootstrap", "_frozen_importlib", "importlib.metadata", f"{PACKAGE}.core.sources")
+ENVIRONMENT = ("os", "collections.abc", "posixpath")  # Python's modules through which a variable is read
+COMPILED = (".nbi", ".nbc")  # of Numba, which follow from code: see `sources.import_class`
 OURS = tuple(f"{PACKAGE}.{part}" for part in ("display", "lab"))  # what they open, a method does not read
 SYSTEM = ("/proc", "/dev", "/sys", "/usr", "/etc", "/lib", "/lib64", "/bin", "/run")
 PEOPLES = ("/dev/shm/", "/run/media/", "/usr/local/share/")  # what lies there below the system's folders is not its own
@@ -37,32 +52,35 @@ PEOPLES = ("/dev/shm/", "/run/media/", "/usr/local/share/")  # what lies there b
 @dataclass
 class Seen:
     """What was opened. read: the state of each file when it was first opened for reading, None where it was not there,
-    unless it was written before; written: files that were written; starts: whether processes were started, which are
-    not seen; began: when [ns]."""
+    unless it was written before, and of each folder whose names were listed; written: files that were written; unseen:
+    in words, what else it took from outside; began: when [ns]."""
 
-    read: dict[str, State | None] = field(default_factory=dict)
+    read: dict[str, State | str | None] = field(default_factory=dict)
     written: set[str] = field(default_factory=set)
-    starts: bool = False
+    unseen: set[str] = field(default_factory=set)
     began: int = field(default_factory=time.time_ns)
 
-    def note(self, path: Any, flags: int = os.O_RDONLY) -> None:
-        """Note a file that is being opened."""
-        if not isinstance(path, str | bytes | os.PathLike):
-            return  # a file that is open already
-        name = os.path.normpath(Path(os.fsdecode(path)).absolute())
+    def note(self, name: str, flags: int = os.O_RDONLY) -> None:
+        """Note a file that is being opened, or a folder, with ``/`` at its end, that is listed."""
+        if not name or name.endswith(COMPILED):
+            return
         if Path(name).parent.name == "__pycache__":
             with suppress(ValueError):
                 name = importlib.util.source_from_cache(name)
         if flags & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
             self.written.add(name)
-        elif name not in self.written and not Path(name).is_dir():
-            self.read.setdefault(name, file_state(name))
+        elif name not in self.written and Path(name).is_dir() == name.endswith("/"):
+            self.read.setdefault(name, state_of(name))
 
     def add(self, other: Seen) -> None:
         """Take over what a later call has opened."""
         self.read = {**other.read, **self.read}
         self.written |= other.written
-        self.starts |= other.starts
+        self.unseen |= other.unseen
+
+    def rewrites(self, path: str) -> bool:
+        """Whether the code itself writes a file that it reads, or into a folder that it lists."""
+        return path in self.written or (path.endswith("/") and state_of(path) != self.read.get(path))
 
     def of_the_method(self, folder: str) -> Seen:
         """The same without installed files, and without those that were made and removed meanwhile.
@@ -73,12 +91,35 @@ class Seen:
             path: state
             for path, state in self.read.items()
             if not is_installed(path, folder)
-            and (state is None or state[-1] < self.began or file_state(path) is not None)
+            and (state is None or Path(path).exists() or (isinstance(state, tuple) and state[-1] < self.began))
         }
         return replace(self, read=read)
 
 
+def content(path: str) -> str:
+    """The digest of a file; where the path ends with ``/``, of the names in a folder, without what this package and
+    Python write there. ``absent`` for what is not there."""
+    if not path.endswith("/"):
+        return file_digest(path)
+    try:
+        return digest(sorted(item.name for item in Path(path).iterdir() if not _is_written_here(item)))
+    except OSError:
+        return ABSENT
+
+
+def _is_written_here(item: Path) -> bool:
+    return item.name == "__pycache__" or any((item / part).is_dir() for part in ("records", "solved"))
+
+
+def state_of(path: str) -> State | str | None:
+    """What changes with the ``content`` of a path; None for a file that is not there."""
+    return content(path) if path.endswith("/") else file_state(path)
+
+
+IMPORTED = Seen()
+"""By the imports of users' files and packages in this process."""
 _recorder: Seen | None = None
+_noting = threading.local()
 
 
 @contextmanager
@@ -104,44 +145,95 @@ def _install() -> None:
 
 
 def _hook(event: str, args: tuple[Any, ...]) -> None:
-    if _recorder is None or (event not in PATHS and event not in PROCESSES):
+    if (seen := _recorder) is None or event not in EVENTS or getattr(_noting, "now", False):
         return
+    _noting.now = True
     with suppress(Exception):  # whatever is wrong with a path, is wrong when it is opened
-        if event in PROCESSES:
-            _recorder.starts = True
-        elif (path := args[PATHS[event]]) is not None and not _is_ours(sys._getframe(1)):
+        if _is_anothers(sys._getframe(1), importing=event in LISTINGS):
+            pass
+        elif event in UNSEEN:
+            seen.unseen.add(UNSEEN[event])
+        elif event in LISTINGS:
+            seen.note(f"{_absolute('.' if args[0] is None else args[0])}/")
+        elif args[PATHS[event]] is not None:
             flags = args[2] if event == "open" and isinstance(args[2], int) else os.O_RDONLY
-            _recorder.note(path, flags)
+            seen.note(_absolute(args[PATHS[event]]), flags)
+    _noting.now = False
 
 
-def _is_ours(frame: FrameType | None) -> bool:
-    """Whether the display opens a file, in a method's call. A method's own code comes first on the way out."""
+def _absolute(path: Any, folder: int | None = None) -> str:
+    """The name of a file or a folder; empty for a file that is open already. folder: number of that where it starts."""
+    if isinstance(path, int) and Path(f"/proc/self/fd/{path}").is_dir():
+        path, folder = "", path
+    if not isinstance(path, str | bytes | os.PathLike):
+        return ""
+    start = Path.cwd() if folder is None else Path(f"/proc/self/fd/{folder}").readlink()
+    return os.path.normpath(start / os.fsdecode(path))
+
+
+def _is_anothers(frame: FrameType | None, importing: bool = False) -> bool:
+    """Whether it is not the user's code that opens a file, but the display, in a method's call, or an installed package
+    as it is imported, which happens once in a process. A method's own code comes first on the way out.
+
+    importing: whether what an import itself opens is not the user's either.
+    """
     while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith(OURS):
+        name, file = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
+        if name.startswith(OURS) or (importing and name.startswith(IMPORTS)):
             return True
-        if not is_installed(frame.f_code.co_filename) and not frame.f_code.co_filename.startswith("<"):
-            return False
+        if not name.startswith(IMPORTS) and not file.startswith("<"):
+            if not is_installed(file):
+                return False
+            importing = True
         frame = frame.f_back
     return False
 
 
+def so_far() -> str | None:
+    """A digest of what users' imports and the present call have read; None where that has changed since, or they took
+    more than files."""
+    seen = Seen()
+    for each in (IMPORTED, _recorder or Seen()):
+        seen.add(each.of_the_method(""))
+    if seen.unseen or any(state_of(path) != state for path, state in seen.read.items()):
+        return None
+    return digest({path: content(path) for path in seen.read})
+
+
 @contextmanager
 def _announced() -> Iterator[None]:
-    """Let functions that open files in C say so."""
+    """Let functions say what they read that no event tells: of C code, by the number of a folder, by a look alone."""
 
     def announced(function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
         def announce(file: Any, *args: Any, **named: Any) -> Any:
-            sys.audit("open", file, "r", os.O_RDONLY)
+            with suppress(Exception):
+                sys.audit("open", _absolute(file, named.get("dir_fd")), "r", os.O_RDONLY)
             return function(file, *args, **named)
 
         return announce
 
+    def opened(path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
+        return by_name(path if dir_fd is None else _absolute(path, dir_fd), flags, mode)
+
+    def variable(environment: Any, key: Any) -> Any:
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None and str(frame.f_globals.get("__name__")).startswith(ENVIRONMENT):
+            frame = frame.f_back
+        if _recorder and key != "HOME" and frame is not None and not is_installed(frame.f_code.co_filename):
+            _recorder.unseen.add(f"the environment variable {os.fsdecode(key)}")
+        return value_of(environment, key)
+
+    by_name, value_of = os.open, type(os.environ).__getitem__
+    told: list[tuple[Any, str, Any]] = [(os, "open", opened), (type(os.environ), "__getitem__", variable)]
+    for place, start in SILENT.items():
+        with suppress(ImportError):
+            module = importlib.import_module(place)  # before a user's code takes functions from it
+            names = [name for name in vars(module) if name.startswith(start)]
+            told += [(module, name, announced(getattr(module, name))) for name in names]
     with ExitStack() as stack:
-        for module in filter(sys.modules.get, SILENT):
-            for name in SILENT[module]:
-                function = getattr(sys.modules[module], name)
-                stack.enter_context(patch.object(sys.modules[module], name, announced(function)))
+        for owner, name, function in told:
+            stack.enter_context(patch.object(owner, name, function))
         yield
 
 

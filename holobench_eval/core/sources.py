@@ -1,20 +1,19 @@
-"""The code of a user's file: the file itself, and what it imports or reads from its own folder or below.
+"""The code of a user's file: the file itself, and what is read for its import and is installed with no package.
 
-Files count whole, comments and docstrings included, since code can read both. What is imported when the file is
-imported is seen; what functions import later is found by its name in the code.
+Files count whole, comments and docstrings included, since code can read both. What functions import or read later is
+seen when they do.
 """
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib
 import os
-import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, FrameType, ModuleType
@@ -22,18 +21,19 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from .errors import UserError
-from .hashing import State, digest, file_digest, file_state
-from .reads import PACKAGE, STARTED, is_installed, recorded, within
+from .hashing import digest
+from .reads import IMPORTED, PACKAGE, Seen, content, is_installed, recorded, so_far, state_of, within
+from .released import edited, file_of, imports, used
 
 
 @dataclass(frozen=True)
 class Code:
     """The code of a class that does not ship with this package.
 
-    name: of the class in its file; files: sha256 by path, seen from the folder of its file; bases: versions of the
-    classes of this package that it derives from or that its files have imported; folder: of its file; uncovered: what
-    else was read for its import; study: folder of the study that names it, empty where there is none; installed:
-    whether it is that of a package.
+    name: of the class in its file; files: sha256 by path, seen from the folder of its file, also of folders whose names
+    were listed (``reads.content``); bases: versions of the classes of this package that it derives from or that its
+    files have imported; folder: of its file; uncovered: what else was read for its import; study: folder of the study
+    that names it, empty where there is none; installed: whether it is that of a package.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Code:
     @property
     def paths(self) -> list[str]:
         """Its files, absolute."""
-        return [os.path.normpath(Path(self.folder, file)) for file in self.files]
+        return [os.path.normpath(Path(self.folder, file)) + "/" * file.endswith("/") for file in self.files]
 
 
 _codes: WeakKeyDictionary[type[Any], Code] = WeakKeyDictionary()
@@ -109,7 +109,7 @@ def import_file(path: Path) -> ModuleType:
     """
     path = path.absolute()  # a file may ask where it is, and its code is identified by where it lies
     folder = str(path.parent)
-    _forget(_reach([path], folder), folder)
+    _forget(folder)
     if not any(isinstance(finder, _Beside) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Beside())
     importlib.invalidate_caches()
@@ -130,26 +130,22 @@ def import_file(path: Path) -> ModuleType:
 def import_class(path: Path, name: str, study: Path | None) -> tuple[ModuleType, Code]:
     """Import a file, and tell what the code of its class ``name`` is, but for what it derives from.
 
-    study: the folder of the study; files that are read for the import and lie there are part of the code. UserError
-    for a file that changes meanwhile, and whatever the file raises.
+    study: the folder of the study. UserError for a file that changes meanwhile, and whatever the file raises.
     """
     folder = str(path.absolute().parent)
-    before = {file: file_state(file) for file in _reach([path.absolute()], folder)}
-    with recorded() as opened:
+    with imports_recorded() as opened:
         module = import_file(path)
-    if any(file_state(file) != state for file, state in before.items()):
-        raise UserError(f"{path} was changed while it was imported; start again")
     seen = opened.of_the_method(folder)
-    read = seen.read
+    files = {file for file in seen.read if not seen.rewrites(file)}  # which would be other code each time
+    if any(state_of(file) != seen.read[file] for file in files):
+        raise UserError(f"{path} was changed while it was imported; start again")
     home = "" if study is None else str(study.absolute())
-    fixed = read.keys() - seen.written  # what an import writes would be other code each time
-    own = {file for file in fixed if lies_in(file, folder) or (home and lies_in(file, home))}
-    loaded = [Path(file) for file in own if file.endswith(".py")]
-    files = own | set(map(str, _reach([path.absolute(), *loaded], folder)))
-    _read.update(map(str, loaded))
-    uncovered = [file for file, state in sorted(read.items()) if state and file not in files]
-    uncovered += [STARTED] if seen.starts else []
-    return module, Code(name, _digests(files, folder), _used(module), folder, tuple(uncovered), home)
+    _read.update(file for file in files if file.endswith(".py"))
+    uncovered = [file for file, state in sorted(seen.read.items()) if state and file not in files]
+    uncovered += sorted(seen.unseen)
+    bases = (*_used(module), *_edits(files))
+    code = Code(name, _digests(files, folder), bases, folder, tuple(uncovered), home)
+    return module, code
 
 
 def _used(module: ModuleType) -> tuple[str, ...]:
@@ -159,18 +155,50 @@ def _used(module: ModuleType) -> tuple[str, ...]:
     return tuple(sorted({declared_version(cls) for cls in values if ships(cls) and hasattr(cls, "solve")}))
 
 
-def lies_in(file: str, folder: str) -> bool:
-    """Whether a file lies below a folder, by its name or by where its links lead."""
-    return within(file, folder) or within(os.path.realpath(file), os.path.realpath(folder))
+def _edits(files: Iterable[str]) -> list[str]:
+    """What of this package these files use and is not as it was released."""
+    changes = edited(name for file in files if file.endswith(".py") for name in imports(Path(file)))
+    return [f"edited {changes}"] if changes else []
 
 
 def _digests(files: Iterable[str], folder: str) -> dict[str, str]:
-    return {os.path.relpath(file, folder): file_digest(file) for file in sorted(files)}
+    return {f"{os.path.relpath(file, folder)}{'/' * file.endswith('/')}": content(file) for file in sorted(files)}
+
+
+@contextmanager
+def imports_recorded() -> Iterator[Seen]:
+    """What is opened within the context, in which a user's file or package is imported."""
+    _keep_compiled_apart()
+    with recorded() as opened:
+        yield opened
+    IMPORTED.add(opened)
+
+
+@cache
+def _keep_compiled_apart() -> None:
+    """Let what Numba has compiled of users' functions be for the code and the files that were read so far alone, since
+    it holds what they call and their global values. Where more than files was taken, nothing is kept."""
+    try:
+        from numba.core.caching import Cache
+    except ImportError:
+        return
+    key_of = Cache._index_key
+
+    def key(kept: Any, *args: Any) -> Any:
+        known, read = key_of(kept, *args), so_far()
+        if is_installed(kept._py_func.__code__.co_filename):
+            return known
+        if read is None:
+            kept.disable()
+            return object()  # is none that is kept
+        return *known, read
+
+    Cache._index_key = key
 
 
 def _of_module(cls: type[Any]) -> Code:
     """The code of a class of an installed package, or of a test: all files of the package, since an import that has
-    happened is no longer seen."""
+    happened is no longer seen, and what these import and is not installed."""
     own = [sys.modules.get(base.__module__) for base in cls.__mro__ if not ships(base)]
     files = [Path(file) for file in (getattr(module, "__file__", None) for module in own) if file]
     if not files:
@@ -179,8 +207,19 @@ def _of_module(cls: type[Any]) -> Code:
     depth = cls.__module__.count(".") - (files[0].name == "__init__.py")
     package = str(files[0].parents[depth - 1]) if depth > 0 else folder
     below = Path(package).rglob("*") if depth > 0 else files
-    contents = [str(file) for file in below if file.is_file() and file.parent.name != "__pycache__"]
-    return Code(cls.__qualname__, _digests(contents, package), bases_of(cls), package, installed=True)
+    contents = {str(file) for file in below if file.is_file() and file.parent.name != "__pycache__"}
+    contents |= {str(file) for file in used([cls.__module__], _is_edited_in_place).values()}
+    bases = (*bases_of(cls), *_edits(contents))
+    others = IMPORTED.of_the_method("")
+    uncovered = (*sorted(others.read.keys() - contents), *sorted(others.unseen))
+    name = f"{cls.__module__}.{cls.__qualname__}"
+    return Code(name, _digests(contents, package), bases, package, uncovered, installed=True)
+
+
+def _is_edited_in_place(module: str) -> bool:
+    """Whether a module lies in a folder of its own, and not where packages are installed."""
+    file = file_of(module.partition(".")[0])
+    return file is not None and not is_installed(str(file))
 
 
 def bases_of(cls: type[Any]) -> tuple[str, ...]:
@@ -188,21 +227,21 @@ def bases_of(cls: type[Any]) -> tuple[str, ...]:
     return tuple(declared_version(base) for base in cls.__mro__ if ships(base))
 
 
-def _forget(files: Iterable[Path], folder: str) -> None:
+def _forget(folder: str) -> None:
     """Take modules from memory that a file would find there in the place of those of its own folder as they are now."""
-    names = {str(Path(os.path.relpath(file, folder)).with_suffix("")).replace(os.sep, ".") for file in files}
-    names = {name.removesuffix(".__init__") for name in names} | _served
+    beside = {file.stem for file in Path(folder).iterdir() if file.suffix == ".py" or file.is_dir()}
     for name, module in list(sys.modules.items()):
-        file = str(getattr(module, "__file__", None))
-        if name.partition(".")[0] in (*sys.stdlib_module_names, PACKAGE, "__main__") or name in _mains:
+        file, top = str(getattr(module, "__file__", None)), name.partition(".")[0]
+        if top in (*sys.stdlib_module_names, PACKAGE, "__main__") or name in _mains:
             continue
-        if (name in names and not is_installed(file)) or file in _read:
+        if ((top in beside or name in _served) and not is_installed(file)) or file in _read:
             del sys.modules[name]
     _served.clear()
 
 
 class _FromSource(SourceFileLoader):
-    """Compiles a file anew for every import. The state in its specification is the folder of the user's file."""
+    """Compiles a file anew for every import. The state in its specification is the folder of the user's file, empty for
+    one that lies elsewhere."""
 
     def get_code(self, fullname: str) -> CodeType:
         return self.source_to_code(self.get_data(self.path), self.path)
@@ -211,7 +250,8 @@ class _FromSource(SourceFileLoader):
 class _Beside:
     """Gives a user's file, and it alone, what lies in its folder: before installed packages, after Python's own.
 
-    So a ``datasets.py`` beside it is what its ``import datasets`` means, and not what that of a library means.
+    So a ``datasets.py`` beside it is what its ``import datasets`` means, and not what that of a library means. What it
+    imports from elsewhere and is not installed, it compiles anew, too.
     """
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
@@ -220,74 +260,33 @@ class _Beside:
         top = name.partition(".")[0]
         if folder is None or top in sys.stdlib_module_names or top == PACKAGE:
             return None
-        spec = PathFinder.find_spec(name, [folder] if path is None else path)
+        spec = PathFinder.find_spec(name, [folder] if folder and path is None else path)
+        # A folder without code, such as one of results, is no package where another one is.
+        if spec is None or (spec.loader is None and path is None):
+            others = (finder for finder in sys.meta_path if not isinstance(finder, _Beside))
+            spec = next(filter(None, (finder.find_spec(name, path) for finder in others)), spec)
         if spec is None or not _is_own(spec, folder):
             return None
-        if spec.loader is None and path is None and PathFinder.find_spec(name) is not None:
-            return None  # a folder without code, such as one of results, is no package where another one is
         if type(spec.loader) is SourceFileLoader:
-            spec.loader, spec.loader_state = _FromSource(spec.loader.name, spec.loader.path), folder
+            spec.loader = _FromSource(spec.loader.name, spec.loader.path)
+            spec.loader_state = folder if within(spec.loader.path, folder) else ""
         _served.add(name)
         return spec
 
 
-def _is_below(file: str, folder: str) -> bool:
-    return within(file, folder) and not is_installed(file, folder)
-
-
 def _is_own(spec: ModuleSpec, folder: str) -> bool:
     places = [spec.origin] if spec.origin else list(spec.submodule_search_locations or ())
-    return bool(places) and all(_is_below(place, folder) for place in places)
+    return bool(places) and not any(is_installed(place, folder) for place in places)
 
 
 def _importer(frame: FrameType | None) -> str | None:
-    """The folder of the user's file whose code imports, None where other code does."""
-    machinery = ("importlib", "_frozen_importlib", __name__)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(machinery):
+    """The folder of the user's file whose code imports, empty for one from elsewhere, None where other code does."""
+    while frame is not None:
+        spec: Any = frame.f_globals.get("__spec__")
+        if isinstance(getattr(spec, "loader", None), _FromSource):
+            return spec.loader_state
+        passes_on = ("importlib", "_frozen_importlib", "runpy", "<run_path>", __name__)
+        if not str(frame.f_globals.get("__name__")).startswith(passes_on):
+            return None
         frame = frame.f_back
-    spec: Any = frame and frame.f_globals.get("__spec__")
-    return spec.loader_state if isinstance(getattr(spec, "loader", None), _FromSource) else None
-
-
-def _reach(files: Iterable[Path], folder: str) -> set[Path]:
-    """Python files that these import, at once or later, and those that they name in a text.
-
-    folder: where they lie, and absolute names start.
-    """
-    waiting, reached = list(files), set[Path]()
-    while waiting:
-        file = waiting.pop()
-        if file not in reached and (state := file_state(file)) is not None and _is_below(str(file), folder):
-            reached.add(file)
-            waiting += [*_named(file, folder, state), *(parent / "__init__.py" for parent in file.parents)]
-    return reached
-
-
-@lru_cache(maxsize=2**10)
-def _named(file: Path, folder: str, _state: State) -> list[Path]:
-    """Where the Python files lie that one may import, by its text."""
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError, OSError):
-        return []
-    named: list[tuple[Path, str]] = []  # where a dotted name starts
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            named += [(Path(folder), alias.name) for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            start = file.parents[node.level - 1] if 0 < node.level <= len(file.parents) else Path(folder)
-            module = node.module or ""
-            named += [(start, f"{module}.{alias.name}".lstrip(".")) for alias in node.names]
-        elif (
-            isinstance(node, ast.Constant)
-            and isinstance(node.value, str)
-            and re.fullmatch(r"[\w./-]{1,200}", node.value)
-        ):
-            text = node.value.removesuffix(".py").lstrip("./").replace("/", ".")
-            named += [(Path(folder), text), (file.parent, text)]
-    found = []
-    for start, name in named:
-        parts = [part for part in name.split(".") if part]
-        for place in (start.joinpath(*parts[: i + 1]) for i in range(len(parts))):
-            found += [place.with_name(f"{place.name}.py"), place / "__init__.py"]
-    return found
+    return None

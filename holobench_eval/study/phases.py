@@ -53,14 +53,20 @@ class Solution:
 
 @dataclass(frozen=True)
 class Phases:
-    """The phases of a results folder. study: the folder of the study that asks, from which paths of files start."""
+    """The phases of a results folder.
+
+    study: the folder of the study that asks, from which paths of files start; own: that of its output's phases whose
+    methods took more than is covered, which no other output may take over (None: the same).
+    """
 
     folder: Path
     study: Path = Path()
+    own: Path | None = None
 
     def path(self, identity: str) -> Path:
         """The file of a phase."""
-        return self.folder / f"{identity}.pt"
+        own = (self.own or self.folder) / f"{identity}.pt"
+        return own if own.exists() else self.folder / own.name
 
     def read(self, identity: str, learned: str | None = "") -> Solution | None:
         """The solution of a name; None where there is none that is whole, one by another training of the method, or one
@@ -68,13 +74,24 @@ class Phases:
 
         learned: sha256 of what the method has learned, None for any.
         """
+        known = self._read(identity)
+        if known is None or learned not in (None, known.learned) or isolation.changed(known.covered, self.study):
+            return None
+        return known
+
+    def fault(self, identity: str) -> str:
+        """Why a phase whose file is there is not taken, and what to do, in words."""
+        known = self._read(identity)
+        if known is None:
+            return "is damaged; delete the file and run again"
+        return f"was solved with another {isolation.changed(known.covered, self.study)} than is there now; run again"
+
+    def _read(self, identity: str) -> Solution | None:
         path = self.path(identity)
         file = unsealed(path.read_bytes(), identity) if path.is_file() else None
         if file is None:
             return None
         content = read_tensors(path, io.BytesIO(file))
-        if learned not in (None, content["learned"]) or isolation.changed(content["covered"], self.study):
-            return None
         return Solution(**content | {"cost": Cost(**content["cost"])}, reused=True)
 
     def locked(self, identity: str) -> AbstractContextManager[None]:
@@ -94,14 +111,18 @@ class Phases:
     def keep(self, identity: str, solution: Solution) -> None:
         """Keep a solution, in the place of an earlier one, and close its account."""
         content = {name: value for name, value in vars(solution).items() if name != "reused"}
-        file = sealed(packed(content | {"cost": asdict(solution.cost)}), identity)
-        write_atomically(self.path(identity), file, lasting=solution.captures > 0)
+        file, own = sealed(packed(content | {"cost": asdict(solution.cost)}), identity), self.own or self.folder
+        path = (own if solution.uncovered else self.folder) / f"{identity}.pt"
+        write_atomically(path, file, lasting=solution.captures > 0)
+        if self.path(identity) != path:
+            self.path(identity).unlink()
         self.journal(identity).close()
 
     def remove(self, identities: Iterable[str]) -> None:
         """Remove phases with their accounts, where they are."""
         for identity in identities:
-            self.path(identity).unlink(missing_ok=True)
+            for path in {self.path(identity), self.folder / f"{identity}.pt"}:
+                path.unlink(missing_ok=True)
             self.journal(identity).close()
 
 
@@ -109,7 +130,7 @@ class Phases:
 class Starts:
     """The phases of one target that other methods begin with, each by a method that knows the nominal optics alone.
 
-    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; covered:
+    basis: what such a phase depends on besides its method, see ``identity.phase``; device: where it is needed; reads:
     what was read for the target; before: those that are from before: what they took is part of what a method costs that
     begins with them.
     """
@@ -117,7 +138,7 @@ class Starts:
     phases: Phases
     basis: Mapping[str, Any]
     device: torch.device
-    covered: Mapping[str, str] = field(default_factory=dict)
+    reads: isolation.Reads = field(default_factory=isolation.Reads)
     before: list[Solution] = field(default_factory=list)
 
     def __call__(self, method: Solver, solve: Callable[[], Tensor]) -> Tensor:
@@ -135,15 +156,15 @@ class Starts:
         began, earlier = time.perf_counter(), len(self.before)
         phase = solve()
         cost = Cost(time.perf_counter() - began).after(known.cost for known in self.before[earlier:])
-        solved = Solution(phase.detach().cpu()[0], 0, cost, alone=False, covered=dict(self.covered), shown=0)
+        solved = Solution(phase.detach().cpu()[0], 0, cost, alone=False, shown=0, **vars(self.reads))
         self.phases.keep(identity, solved)
         return phase
 
 
 def phases_of(output: Path, study: Path = Path()) -> Phases:
     """The phases that a study with this output folder shares: with all of ``holoeval-results``, else with none."""
-    beside = output.absolute().parent
-    return Phases((beside if beside.name == RESULTS else output) / "solved", study)
+    beside, own = output.absolute().parent, output / "solved"
+    return Phases(beside / "solved", study, own) if beside.name == RESULTS else Phases(own, study)
 
 
 def start_of(phase: Tensor) -> Tensor:

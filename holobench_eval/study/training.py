@@ -74,7 +74,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     gate(method, preparation.method, preparation.version, isolation.external(method), preparation.external)
     with recorded() if preparation.images_version else nullcontext(Seen()) as seen:
         dataset, images = _images(preparation, device)
-    read = reads_of(dataset, plugins.params_of, seen).covered
+    read = reads_of(dataset, plugins.params_of, seen)
     split = len(images) - preparation.training.held_out
     display_bench = opening.open_display(preparation.display, preparation.seed, device)
     source = {"dataset": preparation.training.dataset, "params": dict(preparation.training.params)}
@@ -105,7 +105,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         state = method.prepare(bench)
     if not isinstance(state, Mapping):
         raise CellError(f"{preparation.method}: prepare returned {type(state).__name__}, not a mapping of tensors")
-    state = moved(state, CPU)
+    state, reads = moved(state, CPU), read | ready.reads
     outdated, before = artifacts.outdated(preparation), [known for start in shared.values() for known in start.before]
     facts: dict[str, Any] = {
         **({"in_the_place_of": outdated} if outdated else {}),
@@ -117,7 +117,8 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
         "left_out": state.get("left_out"),
         "package": __version__,
         "method_sha256": method_version(type(method)),
-        "reads": {**read, **ready.reads.covered},
+        "reads": {**reads.covered},
+        **({"uncovered": [*reads.uncovered]} if reads.uncovered else {}),
         "harness_sha256": HARNESS,
         "made": now(),
     }

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..core import plugins, sources
 from ..core.errors import CellError
+from ..core.released import edited
 
 # What a method is given: the pixels of its target, nominal optics, random numbers. A new version is any new text; every
 # phase is then solved again.
@@ -24,6 +25,7 @@ PHOTOGRAPHS = "means over the target's pixels"
 # The alignment of a photograph with its target without fiducials (``holoeval score``).
 ALIGNMENT = "captures whose red and blue are exchanged have no score"
 
+EDITED = ", edited "  # in the version of a method that ships with the package, before the digest
 AGAIN = "has changed since the study was planned; start the run again"
 
 
@@ -32,15 +34,19 @@ def method_version(cls: type[Any]) -> str:
 
     A shipped method declares ``version: ClassVar[int]``, 1 if it says nothing. It is raised when the method gives
     other phases, or learns something else: phases are then computed, and artifacts learned, again. What a user's
-    class says of its version is a label for people.
+    class says of its version is a label for people. Where its files differ from those that were released, the digest of
+    the differing ones is part of it.
     """
-    return sources.declared_version(cls) if sources.ships(cls) else sources.code_of(cls).sha256
+    if not sources.ships(cls):
+        return sources.code_of(cls).sha256
+    changes = edited((cls.__module__,))
+    return f"{sources.declared_version(cls)}{f'{EDITED}{changes}' if changes else ''}"
 
 
 def dataset_version(name: str, cls: type[Any]) -> str:
-    """The version of the code of a dataset that does not ship with the package; empty for one that does, whose pixels
-    the digests of its images tell."""
-    return "" if plugins.is_shipped("datasets", name) else method_version(cls)
+    """The version of the code of a dataset that does not ship with the package, or is not as it was released; empty for
+    another one, whose pixels the digests of its images tell."""
+    return edited((cls.__module__,)) if plugins.is_shipped("datasets", name) else method_version(cls)
 
 
 def gate(

@@ -21,6 +21,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from holobench_eval.core import plugins, seeds
+from holobench_eval.core.sources import declared_version
 from holobench_eval.display import DisplaySpec, load_profile
 from holobench_eval.display.api import Capture
 from holobench_eval.display.nominal import ideal_light
@@ -34,7 +35,7 @@ from holobench_eval.metrics import catalogue, control, match, score
 from holobench_eval.metrics.protocol import VERSION as PROTOCOL
 from holobench_eval.study.opening import open_bench
 from holobench_eval.study.scoring.changed import changed_target, moved_phase
-from holobench_eval.study.versions import ALIGNMENT, HARNESS, method_version
+from holobench_eval.study.versions import ALIGNMENT, HARNESS
 from tests.support import photographed
 from tests.support import small_training as small
 from tests.support.toy_camera import ToyDisplay, picture
@@ -165,7 +166,9 @@ def cases() -> dict[str, Case]:
     known["alignment"] = Case(ALIGNMENT, _alignment)
     for name, cls in methods.items():
         if _installed(cls):
-            known[f"method {name}"] = Case(method_version(cls), partial(_method, name), TOLERANCES.get(name, ITERATED))
+            known[f"method {name}"] = Case(
+                declared_version(cls), partial(_method, name), TOLERANCES.get(name, ITERATED)
+            )
     return known
 
 

@@ -80,8 +80,22 @@ def test_a_method_with_a_camera_is_solved_on_each_display_and_once_on_the_same(t
 
 def test_only_studies_of_a_folder_of_results_share_their_phases():
     first, second = (phases_of(Path("here", RESULTS, name)) for name in "ab")
-    assert first == second == Phases(Path("here", RESULTS, "solved").absolute())
+    assert first.folder == second.folder == Path("here", RESULTS, "solved").absolute()
+    assert first.own != second.own
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
+
+
+def test_a_phase_that_took_more_than_is_covered_is_that_of_its_output_alone(tmp_path):
+    first, second = (phases_of(tmp_path / RESULTS / name) for name in "ab")
+    for uncovered in (("an environment variable",), ()):
+        first.keep("ab", replace(SOLUTION, uncovered=uncovered))
+        read = first.read("ab", None)
+        assert read is not None
+        assert read.uncovered == uncovered
+        assert (second.read("ab", None) is None) == bool(uncovered)
+    first.keep("ab", replace(SOLUTION, uncovered=("a child",)))
+    first.remove(["ab"])
+    assert first.read("ab", None) is None
 
 
 def test_a_phase_that_is_lost_or_damaged_is_solved_again_to_the_same_scores(tmp_path, found):

@@ -32,6 +32,8 @@ def test_the_code_of_an_installed_method_is_all_of_its_package(tmp_path, monkeyp
     before = code()
     assert set(before.files) == files
     assert code().sha256 == before.sha256
+    other = code_of(importlib.import_module("a_shop.plug.deep.first").Method)  # of the same package and name
+    assert (other.files, other.sha256 == before.sha256) == (before.files, False)
     (tmp_path / "a_shop" / "data.txt").write_text("6.0")
     assert code().sha256 != before.sha256
 

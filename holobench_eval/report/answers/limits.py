@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..data.layout import FLOOR
-from ..data.phrases import remarks, too_few, uncovered
+from ..data.phrases import edited, remarks, too_few, uncovered
 from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, grouped, words
 from ..markdown import Markdown
@@ -25,7 +25,7 @@ def limits(report: Report, kind: Kind) -> list[Markdown]:
     texts += [f"Measured: {report.layout.text.caution}"] * bool(report.layout.text.caution)
     texts += [f"Published: {report.layout.reported_source}."] * bool(report.layout.reported_source)
     texts += [f"Note: {report.layout.note}"] * bool(report.layout.note)
-    texts += [text for text in (uncovered(report.records),) if text]
+    texts += [text for text in (uncovered(report.records), edited(report.records)) if text]
     texts += [*_weights(report), *_tuned(report), *_seconds(report), *_lpips(report)]
     found = []
     for text in texts:

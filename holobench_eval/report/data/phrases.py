@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import one_line
+from ...core import plugins
+from ...core.errors import listed, one_line
 from ...study.folders.files import named
+from ...study.versions import EDITED, dataset_version
 from .column import DONE
 from .results import Results
 from .scores import Score
@@ -99,15 +101,26 @@ def _dominating(results: Results, label: str, condition: str) -> str:
 
 
 def uncovered(records: Sequence[Mapping[str, Any]]) -> str:
-    """Which files methods were seen to read that no cell is named after; empty for none. Installed ones do not count:
-    their packages have versions."""
+    """What methods and datasets were seen to take that no cell is named after; empty for nothing. Installed files do
+    not count: their packages have versions."""
     found: dict[str, dict[str, None]] = {}
     for record in records:
         own = [name for name in record.get("uncovered") or () if not INSTALLED.intersection(Path(name).parts)]
         found.setdefault(str(record["label"]), {}).update(dict.fromkeys(map(one_line, own)))
     parts = [f"{label} reads {named(list(names))}" for label, names in found.items() if names]
-    remedy = "a change there is not noticed; keep such files beside the config, or choose another --output after it"
+    again = ", with --retrain" * any(record.get("learned") for record in records if record.get("uncovered"))
+    remedy = f"a change there is not noticed; after one choose another --output{again}"
     return f"Not covered: {'; '.join(parts)}: {remedy}." if parts else ""
+
+
+def edited(records: Sequence[Mapping[str, Any]]) -> str:
+    """Which methods and datasets of this package differ from those that were released; empty for none."""
+    labels = [str(record["label"]) for record in records if EDITED in str(record["cell"].get("code"))]
+    datasets = {str(record["cell"].get("dataset")) for record in records}
+    shipped = [name for name in sorted(datasets) if plugins.is_shipped("datasets", name)]
+    labels += [name for name in shipped if dataset_version(name, plugins.find("datasets", name))]
+    whose = listed(dict.fromkeys(labels), "and")
+    return f"Edited: the code of {whose} is not as released; its cells have names of their own." if labels else ""
 
 
 def too_few(results: Results) -> str:

@@ -37,7 +37,7 @@ from .handles import answer, known
 from .inside import opens, serve
 from .messages import Channel, GarbledError
 
-KEPT = 32  # processes of methods that stay when they have nothing to do
+KEPT = 32  # processes of methods that stay when they have nothing to do, beside those of the present study
 IMPORT_LIMIT = 600.0  # seconds that the import of a method's file may take
 MOST_PROCESSES = 2**22  # of Linux, proc(5), pid_max
 ANSWER_LIMIT = 10.0  # seconds in which the process that has imported it answers
@@ -293,10 +293,13 @@ _processes: list[MethodProcess] = []  # the last one is that which was used last
 def process_of(name: str, folder: Path) -> MethodProcess:
     """The process of a method, the same one while its code and the Python files beside it stay as they are."""
     key = (name, folder, Path.cwd())
-    found = next((process for process in _processes if process.key == key and process.is_current()), None)
+    found = next((process for process in _processes if process.key == key), None)
     if found is not None:
         _processes.remove(found)
-    _processes.append(found or MethodProcess(*key))
-    if len(_processes) > KEPT:
-        _processes.pop(0).end()
+    ending = [process for process in _processes[:-KEPT] if process.key[1:] != key[1:]]
+    if found is not None and not found.is_current():
+        ending, found = [*ending, found], None
+    for process in ending:
+        process.end()
+    _processes[:] = [process for process in _processes if process not in ending] + [found or MethodProcess(*key)]
     return _processes[-1]

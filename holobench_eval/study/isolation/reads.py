@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...core.hashing import ABSENT, file_digest, file_state
-from ...core.reads import STARTED, Seen, within
-from ...core.sources import Code, code_of, lies_in, ships
+from ...core.hashing import file_digest, file_state
+from ...core.reads import Seen, content, state_of, within
+from ...core.sources import Code, code_of, ships
 
 LARGEST = 2**36  # bytes of a file that is hashed
 CHANGED = "changed while it was read"  # in place of a digest
@@ -21,45 +21,48 @@ class Reads:
     """What a user's code read in its calls.
 
     covered: sha256 by path, seen from the study's folder where the file lies there; ``absent`` for a file that was
-    asked for in vain. uncovered: paths of other files, of those too that the code itself writes after it has read them,
-    and in words what cannot be seen.
+    asked for in vain; a path of a folder whose names were listed ends with ``/``. uncovered: paths of files that the
+    code itself writes after it has read them, and in words what cannot be seen.
     """
 
-    covered: Mapping[str, str]
-    uncovered: tuple[str, ...]
+    covered: Mapping[str, str] = field(default_factory=dict)
+    uncovered: tuple[str, ...] = ()
+
+    def __or__(self, other: Reads) -> Reads:
+        """What both have read."""
+        return Reads({**self.covered, **other.covered}, tuple(sorted({*self.uncovered, *other.uncovered})))
 
 
 def reads_of(plugin: Any, params_of: Callable[[Any], Any], opened: Seen) -> Reads:
-    """What a user's method or dataset has read, told apart: covered is what lies below the folder of the study or of
-    its file, and what a parameter names, itself or by a folder above it; files of its own code count there.
+    """What a user's method or dataset has read beside its code, and what a parameter names.
 
     Nothing for one of this package, which declares what it reads, or has a digest for each image.
     """
     if ships(type(plugin)):
-        return Reads({}, ())
+        return Reads()
     code, params = code_of(type(plugin)), params_of(plugin)
-    seen = opened.of_the_method(code.folder)
-    study = Path(code.study).absolute()
-    folder, named = str(study), [path for paths in _places(params, study).values() for path in paths]
-    places, own = [folder, code.folder, *named], dict(zip(code.paths, code.files.values(), strict=True))
+    seen, study = opened.of_the_method(code.folder), Path(code.study).absolute()
+    named = [path for paths in _places(params, study).values() for path in paths]
+    own = dict(zip(code.paths, code.files.values(), strict=True))
     # C code may have read a file that a parameter names.
     states = {**{path: file_state(path) for path in named if path not in seen.written}, **seen.read}
-    covered, uncovered = dict[str, str](), {*code.uncovered, *([STARTED] if seen.starts else [])}
+    covered, uncovered = dict[str, str](), {*code.uncovered, *seen.unseen}
     for path, state in states.items():
-        if Path(path).is_dir() or (path in own and file_digest(path) == own[path]):
+        if (Path(path).is_dir() and not path.endswith("/")) or own.get(path) == content(path):
             continue
-        is_fixed = path not in seen.written and (state is None or state[1] <= LARGEST)
-        if not is_fixed or not any(lies_in(path, place) for place in places):
-            uncovered |= {path} if state is not None else set()
-            continue
-        name = os.path.relpath(path, folder) if within(path, folder) else path
-        covered[name] = ABSENT if state is None else file_digest(path) if file_state(path) == state else CHANGED
-    return Reads(dict(sorted(covered.items())), tuple(sorted(uncovered)))
+        if not seen.rewrites(path) and not (isinstance(state, tuple) and state[1] > LARGEST):
+            covered[path] = content(path) if state_of(path) == state else CHANGED
+        elif state is not None:
+            uncovered.add(path)
+    seen_from = {path: f"{os.path.relpath(path, study)}{'/' * path.endswith('/')}" for path in covered}
+    fixed = {seen_from[path] if within(path, str(study)) else path: sha256 for path, sha256 in covered.items()}
+    return Reads(dict(sorted(fixed.items())), tuple(sorted(uncovered)))
 
 
 def changed(covered: Mapping[str, str], folder: Path) -> str:
     """The first path of ``Reads.covered`` that has another digest now; empty for none. folder: of the study."""
-    return next((path for path, sha256 in covered.items() if file_digest(folder / path) != sha256), "")
+    now = {path: content(f"{folder / path}{'/' * path.endswith('/')}") for path in covered}
+    return next((path for path, sha256 in covered.items() if now[path] != sha256), "")
 
 
 def named_files(params: Any, code: Code) -> dict[str, str]:

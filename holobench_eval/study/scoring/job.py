@@ -6,7 +6,8 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import or_
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,8 @@ class Job:
         """The record of a cell, with these further entries."""
         label = cell.method if self.task.is_floor else self.task.label
         if state == "done":
-            further["reads"] = {**self.target_reads(), **further.get("reads", {})}
+            reads = self.given_reads() | Reads(further.get("reads", {}), further.get("uncovered", ()))
+            further |= {"reads": reads.covered, "uncovered": reads.uncovered}
         return Record(cell.description(), state, label, cell.condition, cell.target, **further)
 
     def failed(self, cell: Cell, error: BaseException) -> Record:
@@ -156,10 +158,12 @@ class Job:
         """The target of a cell at the size of the scored region; see ``load_target``."""
         return load_target(self.source(cell), display)
 
-    def target_reads(self) -> dict[str, str]:
-        """What a user's dataset has read for the task's targets, see ``isolation.Reads``."""
+    def given_reads(self) -> Reads:
+        """What a user's dataset has read for the task's targets, and what the method's training took that is not
+        covered."""
         reads = (_current(self.source(cell), self.task.conditions[0])[1] for cell in self.task.cells)
-        return {path: sha256 for read in reads for path, sha256 in read.covered.items()}
+        learned = self.learned(self.task.preparation)
+        return reduce(or_, reads, Reads(uncovered=tuple(learned.provenance.get("uncovered", ())) if learned else ()))
 
 
 def load_target(source: TargetSource, display: Condition) -> Tensor:

@@ -45,7 +45,7 @@ def _solution(job: Job, display: Condition, target: Tensor, solve: Solve) -> Sol
     if known is not None and (known.alone or not job.timed):
         return known
     basis = {name: first.phase[name] for name in identity.BASIS}
-    shared = Starts(job.phases, basis, job.device, job.target_reads())
+    shared = Starts(job.phases, basis, job.device, job.given_reads())
     method = job.method(first.method, first.params)
     gate(method, first.method, first.code, isolation.digests(method, first.target), first.files)
     journal = job.phases.journal(first.phase_id)
@@ -91,9 +91,8 @@ def solved_by(job: Job, method: Any, label: str, handle: MeteredDisplay, solve: 
         taken,
         stopped,
         alone=job.alone,
-        covered={**job.target_reads(), **ready.reads.covered},
-        uncovered=ready.reads.uncovered,
         shown=handle.shown,
+        **vars(job.given_reads() | ready.reads),
     )
 
 

@@ -39,7 +39,7 @@ def _read(phases: Phases, identity: str, until: float) -> Tensor:
     path = _seen(phases.path(identity), until)
     solved = phases.read(identity, learned=None)
     if solved is None:
-        raise CellError(f"{path}, from which this method starts, is damaged; delete the file and run again")
+        raise CellError(f"{path}, from which this method starts, {phases.fault(identity)}")
     return start_of(solved.phase)
 
 
@@ -56,7 +56,8 @@ def affected(
     """The cells to compute where those of ``missing`` have to be, and those whose records hold no longer, by id.
 
     A cell that starts from a missing one is computed again, since that one may have failed before; not so where that
-    one has a score and is only timed again, for its phase stays. A start whose phase was not kept is computed again.
+    one has a score and is only timed again, for its phase stays. A start whose phase is not there as it was kept is
+    computed again.
     """
     followers = [cell for cell in plan.cells if cell.starts]
     new = {identity for identity in missing if states[identity] not in MEASURED}
@@ -64,5 +65,5 @@ def affected(
     computed = missing | outdated
     wanted = {identity for cell in followers if cell.id in computed for identity in cell.starts}
     by_id = {cell.id: cell.phase_id for cell in plan.cells}
-    unkept = {name for name in wanted if states[name] in MEASURED and not phases.path(by_id[name]).exists()}
+    unkept = {name for name in wanted if states[name] in MEASURED and phases.read(by_id[name], learned=None) is None}
     return computed | unkept, outdated

@@ -262,17 +262,17 @@ def test_learning_and_watching_methods_go_round_by_round_to_what_they_gain_direc
     assert 3 <= number <= 9
     run("run", config, "--output", tmp_path / "direct", "--executor", "serial", "--artifacts", tmp_path / "artifacts")
     ours, direct = table(folder / "report"), table(tmp_path / "direct")
-    for method in ("online_camera", "parametric_model"):
+    # What they gain over six seeds has a standard deviation of 0.04 and 0.31 dB; two runs differ by three times that of
+    # their difference at most, and the alignment of photographs adds to the smaller.
+    for method, apart in {"online_camera": 0.3, "parametric_model": 1.3}.items():
         row, counted = (method, "green"), ["captures", "training_captures"]
         assert ours.loc[row, counted].equals(direct.loc[row, counted])
-        # Two trainings end apart: by 0.2 dB with other noise of the camera, and one by 0.6 dB on another processor. So
-        # what they gain is compared, 5 dB by the model and 0.9 by the camera.
         gained, wanted = (
             scores.loc[row, "psnr_linear_db"] - scores.loc[("wirtinger", "green"), "psnr_linear_db"]
             for scores in (ours, direct)
         )
-        assert wanted > 0.6
-        assert gained == pytest.approx(wanted, rel=0.5)
+        assert wanted > 2 * apart
+        assert gained == pytest.approx(wanted, abs=apart)
 
 
 def test_an_export_that_was_interrupted_goes_on_with_import(tmp_path):

@@ -107,4 +107,6 @@ def test_files_that_no_cell_is_named_after_are_told_once_and_installed_ones_are_
     assert text.startswith("Not covered: mine reads /data/k.json: a change there is not noticed")
     assert "scipy" not in text
     assert uncovered(records[2:]) == ""
+    assert text.endswith("after one choose another --output.")
+    assert uncovered([{**records[1], "learned": {"sha256": "a"}}]).endswith("another --output, with --retrain.")
     assert "\x1b" not in uncovered([reading("mine", "/data/\x1b[2J.json")])  # which a terminal would obey

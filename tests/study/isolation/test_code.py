@@ -158,9 +158,7 @@ def test_an_edit_makes_another_method_apart(name, tmp_path):
 IMPORTS = {  # how a file may use the module ``{name}`` in ``{file}``
     "absolute": "import {name}\nvalue += {name}.value",
     "from": "from {name} import value as one\nvalue += one",
-    "lazy": "def late():\n    import {name}\n    return {name}.value",
     "importlib": "import importlib\nvalue += importlib.import_module('{name}').value",
-    "lazy importlib": "def later():\n    import importlib\n    return importlib.import_module('{name}').value",
     "path": "import runpy, pathlib\nvalue += runpy.run_path(str(HOME / '{file}'))['value']",
 }
 PARTS = {  # where a number may be

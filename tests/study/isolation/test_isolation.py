@@ -192,7 +192,7 @@ def test_a_file_that_imports_the_bench_runs_inside_alone(tmp_path, no_physics):
     assert solved(tmp_path, "load_profile(bench.spec.name)", top, isolation="none")["state"] == "done"
 
 
-def test_methods_that_have_ended_keep_no_files_open(tmp_path, monkeypatch):
+def test_methods_of_other_studies_end_and_keep_no_files_open(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "KEPT", 2)
     monkeypatch.setattr(process, "_processes", [])
     counts = []
@@ -201,9 +201,13 @@ def test_methods_that_have_ended_keep_no_files_open(tmp_path, monkeypatch):
         (tmp_path / str(number) / "mine.py").write_text("def Mine(target, bench):\n    return target\n")
         isolation.build("mine.py:Mine", {}, tmp_path / str(number))
         counts.append(len(list(Path("/proc/self/fd").iterdir())))
+    names = [f"mine.py:{name}" for name in ("One", "Two", "Three", "Four")]
+    (tmp_path / "mine.py").write_text("def One(target, bench):\n    return target\n\n\nTwo = Three = Four = One\n")
+    of_one_study = [[process.process_of(name, tmp_path) for name in names] for _ in range(2)]
     for kept in process._processes:
         kept.end()
     assert counts[-1] == counts[3]
+    assert of_one_study[0] == of_one_study[1]  # however many there are
 
 
 def test_a_plain_script_runs_beside_files_named_like_modules_and_ends_though_a_file_is_deaf(tmp_path):

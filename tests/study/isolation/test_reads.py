@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+from holobench_eval.core import reads
 from holobench_eval.core.device import CPU
 from holobench_eval.core.reads import STARTED, Seen
 from holobench_eval.study import isolation
@@ -88,10 +89,10 @@ def test_what_a_call_reads_is_covered_or_named(tmp_path, monkeypatch, build):
     method = build(study)
     with isolation.opened(method, CPU) as ready:
         method.solve(2.0, None)
-    named = {str(path): sha256(path) for path in (outside / "weights.bin", outside / "tables" / "one.txt")}
+    elsewhere = ("weights.bin", "tables/one.txt", "other.txt")
+    named = {str(outside / name): sha256(outside / name) for name in elsewhere}
     assert ready.reads.covered == {name: sha256(study / name) for name in INSIDE} | named | {"nothing.txt": "absent"}
-    others = outside / "at_import.txt", outside / "other.txt", study / "count.txt"
-    assert set(ready.reads.uncovered) == {STARTED, *map(str, others)}
+    assert set(ready.reads.uncovered) == {STARTED, str(study / "count.txt")}
 
 
 def test_a_method_of_this_package_declares_what_it_reads():
@@ -116,12 +117,33 @@ def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp
     assert isolation.changed(covered, tmp_path) == "a.txt"
 
 
-FILES = [[], {"a": (1, 2)}, {"a": "b"}, {1.5: None}]
+FILES = [[], {"a": (1, 2)}, {"a": 1.5}, {1.5: None}]
 
 
-@pytest.mark.parametrize("told", [None, *({"read": files} for files in FILES), {"written": 3}, {"starts": "<script>"}])
+@pytest.mark.parametrize("told", [None, *({"read": files} for files in FILES), {"written": 3}, {"unseen": 3}])
 def test_reads_that_are_no_reads_are_refused(told):
     ours, theirs = Pipe()
     Channel(theirs).send({"result": 1, "seen": told})
     with pytest.raises(GarbledError, match="no reads"):
         call(Channel(ours), Seen(), "solve", {}, ())
+
+
+def test_what_an_installed_package_reads_as_it_is_imported_is_its_own(tmp_path, monkeypatch):
+    installed = tmp_path / "installed" / "a_library_"
+    installed.mkdir(parents=True)
+    (tmp_path / "cache.txt").write_text("1")
+    (installed / "__init__.py").write_text(
+        f"from pathlib import Path\nPath({str(tmp_path / 'cache.txt')!r}).read_text()\n"
+    )
+    (tmp_path / "study").mkdir()
+    text = "def Mine(target, bench):\n    import a_library_\n    return target\n"
+    (tmp_path / "study" / "mine.py").write_text(text)
+    monkeypatch.syspath_prepend(installed.parent)
+    places = reads._installed()
+    reads.is_installed.cache_clear()
+    monkeypatch.setattr(reads, "_installed", lambda: (*places, str(installed.parent)))
+    method = inside(tmp_path / "study")
+    with isolation.opened(method, CPU) as ready:
+        method.solve(2.0, None)
+    reads.is_installed.cache_clear()
+    assert ready.reads == isolation.Reads()

@@ -201,12 +201,31 @@ def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is
         starts_of(store, follower)
 
 
-@pytest.mark.usefixtures("done")
-def test_a_start_in_a_damaged_file_is_an_error(store, grid):
-    file = phase_file(store, cells(grid, "good")[0])
+def other_file(store: Store, cell: Cell) -> str:
+    phases = phases_of(store.output)
+    known = phases.read(cell.phase_id, None)
+    assert known is not None
+    phases.keep(cell.phase_id, replace(known, covered={"data.txt": "0" * 64}))
+    return "was solved with another data.txt than is there now; run again"
+
+
+def damaged(store: Store, cell: Cell) -> str:
+    file = phase_file(store, cell)
     file.write_bytes(file.read_bytes()[:-100])
-    with pytest.raises(CellError, match=r"\.pt, from which this method starts, is damaged; delete the file"):
-        starts_of(store, cells(grid, "oracle")[0])
+    return "is damaged; delete the file and run again"
+
+
+@pytest.mark.parametrize("change", [damaged, other_file])
+def test_a_start_that_is_not_as_it_was_kept_is_an_error_with_its_reason_and_the_next_run_solves_it(
+    done, store, grid, change
+):
+    follower, solved = cells(grid, "oracle")[0], len(solves(done.parent))
+    reason = change(store, cells(grid, "good")[0])
+    with pytest.raises(CellError, match=rf"\.pt, from which this method starts, {reason}"):
+        starts_of(store, follower)
+    store.remove([follower.id])
+    compute(done)
+    assert [line.split()[0] for line in solves(done.parent)[solved:]] == ["Toy"]
 
 
 def test_a_start_is_the_phase_that_was_shown_to_a_tenth_of_a_milliradian():
