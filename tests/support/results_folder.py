@@ -1,17 +1,14 @@
-"""A folder of results as somebody hands it in: records.csv, tests.csv, provenance.json and thumbnails."""
+"""A folder with the files of a report that the site reads."""
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
 from holobench_eval.core.hashing import digest
 from holobench_eval.display import load_profile
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.data.tables import csv_text
-from holobench_eval.report.files.tests_csv import comparison_frame
+from holobench_eval.report.files import write_files
 from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
 
@@ -32,11 +29,9 @@ def provenance(**changes: Any) -> dict[str, Any]:
 def write_results(
     folder: Path,
     records: Sequence[Mapping[str, Any]],
-    by: str | None = None,
-    thumbnails: int = 0,
     known: Mapping[str, Any] | None = None,
 ) -> Path:
-    """A folder with the files of these records; an own one (by is None) has a report.md, too."""
+    """A folder with the files of data of these records, a report.md and a provenance.json."""
     records = [{**record, "id": digest(record["cell"])} for record in records]
     pairs = tuple(dict.fromkeys((r["label"], r["cell"]["condition"]) for r in records))
     shown = tuple(pair for pair in pairs if pair[1] != "reference")
@@ -44,33 +39,12 @@ def write_results(
     camera = frozenset(r["label"] for r in records if r["scores"].get("captures", r.get("captures", 0)))
     layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name, camera=camera)
     results = Results(records_frame([_short(record) for record in records], layout), layout)
-    folder.mkdir(parents=True, exist_ok=True)
-    frames = {"records.csv": results.frame, "tests.csv": comparison_frame(results)}
-    if by is None:
-        frames["table.csv"] = results.table
-    for name, frame in frames.items():
-        (folder / name).write_text(csv_text(frame), encoding="utf-8")
-    told = provenance(**(known or {})) | ({"by": by} if by is not None else {})
-    (folder / "provenance.json").write_text(json.dumps(told))
-    if by is None:
-        (folder / "report.md").write_text(REPORT)
-    done = [r for r in records if r["state"] == "done" and r["label"] == "HIL"]
-    for record in done[:thumbnails]:
-        path = folder / "thumbnails" / f"{record['id']}.png"
-        path.parent.mkdir(exist_ok=True)
-        Image.new("RGB", (32, 24), (200, 40, 40)).save(path)
+    write_files(results, folder)
+    (folder / "provenance.json").write_text(json.dumps(provenance(**(known or {}))))
+    (folder / "report.md").write_text(REPORT)
     return folder
 
 
 def _short(record: Mapping[str, Any]) -> dict[str, Any]:
     """A record with few of its scores, which is quicker."""
     return {**record, "scores": {key: value for key, value in record["scores"].items() if key in SCORES}}
-
-
-def edited(folder: Path, column: str, value: str, row: int = -1) -> None:
-    """Write another value into a column of a row of records.csv (-1: the last)."""
-    import pandas as pd
-
-    frame = pd.read_csv(folder / "records.csv", dtype=str, keep_default_na=False)
-    frame.loc[frame.index[row], column] = value
-    frame.to_csv(folder / "records.csv", index=False)

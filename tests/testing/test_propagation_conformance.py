@@ -1,7 +1,6 @@
-"""Right propagators pass the kit, and each well-known mistake fails the check that is there for it, with its cause."""
+"""Right propagators pass the kit, and each well-known mistake fails the check that is there for it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,51 +67,57 @@ def turned(self, field):
 
 
 MISTAKES = [
-    ({"flaw": "half a sample", "padding": 2}, "centring", "half a sample off (linspace for fftfreq), padded 2x"),
-    ({"flaw": "half a sample", "padding": 1}, "white field, 96", "half a sample off (linspace for fftfreq), padded 1x"),
-    ({"flaw": "half a sample", "padding": 3}, "white field, 96", "half a sample off (linspace for fftfreq), padded 3x"),
-    ({"flaw": "float32 carrier"}, "long direct sum", "float32"),
-    ({"flaw": "low pass"}, "white field, 96", "a low pass: the band ends at 0.50 of that of the pixels on each axis"),
-    ({"flaw": "shift", "padding": 3}, "white field, odd", "fftshift for ifftshift"),
-    ({"flaw": "shift", "padding": 1}, "white field, odd", "fftshift for ifftshift"),
-    ({"flaw": "paraxial"}, "white field, 96", "a paraxial (Fresnel) model"),
-    ({"padding": 1}, "wrap-around beyond", "circular"),
-    ({"padding": 1}, "white field, 96", "circular"),
-    ({"padding": 1, "flaw": "limited"}, "wrap-around within", "circular"),
-    ({"padding": 2}, "white field, far", "too little without a band limit"),
-    ({"flaw": "wrong sign"}, "direct sum", "wrong sign"),
-    ({"forward": turned}, "white field, 96", "turned"),
-    ({"forward": lambda self, field: Written.forward(self, field) * field.numel()}, "energy", "a factor of 1.64e+04 "),
-    ({"forward": lambda self, field: self.filtered(field, 0.9 * self.transfer)}, "energy", "a factor of 0.9 "),
-    ({"forward": lambda self, field: Written.forward(self, field).roll(1, 1)}, "centring", "(0.00, 1.00) px aside"),
-    ({"forward": lambda self, field: Written.forward(self, field).abs()}, "energy", "float"),
-    ({"forward": lambda self, field: Written.forward(self, field)[None]}, "energy", "shape (1, 128, 128)"),
-    ({"forward": lambda self, field: Written.forward(self, field) ** 3}, "white field, 96", "none of the mistakes"),
-    ({"adjoint": Written.forward}, "adjointness", "adjoint: wrong sign"),
-    ({"adjoint": Written.forward}, "phase gradient", "times the difference"),
-    ({"adjoint": lambda self, field: 2 * self.filtered(field, self.transfer.conj())}, "adjointness", "a factor of 2 "),
+    ({"flaw": "half a sample", "padding": 2}, "centring"),
+    ({"flaw": "half a sample", "padding": 1}, "white field, 96"),
+    ({"flaw": "half a sample", "padding": 3}, "white field, 96"),
+    ({"flaw": "float32 carrier"}, "long direct sum"),
+    ({"flaw": "low pass"}, "white field, 96"),
+    ({"flaw": "shift", "padding": 3}, "white field, odd"),
+    ({"flaw": "shift", "padding": 1}, "white field, odd"),
+    ({"flaw": "paraxial"}, "white field, 96"),
+    ({"padding": 1}, "wrap-around beyond"),
+    ({"padding": 1}, "white field, 96"),
+    ({"padding": 1, "flaw": "limited"}, "wrap-around within"),
+    ({"padding": 2}, "white field, far"),
+    ({"flaw": "wrong sign"}, "direct sum"),
+    ({"forward": turned}, "white field, 96"),
+    ({"forward": lambda self, field: Written.forward(self, field) * field.numel()}, "energy"),
+    ({"forward": lambda self, field: self.filtered(field, 0.9 * self.transfer)}, "energy"),
+    ({"forward": lambda self, field: Written.forward(self, field).roll(1, 1)}, "centring"),
+    ({"forward": lambda self, field: Written.forward(self, field) ** 3}, "white field, 96"),
+    ({"forward": lambda self, field: Written.forward(self, field) / field.abs().max()}, "adjointness"),
+    ({"adjoint": Written.forward}, "adjointness"),
+    ({"adjoint": Written.forward}, "phase gradient"),
+    ({"adjoint": lambda self, field: 2 * self.filtered(field, self.transfer.conj())}, "adjointness"),
 ]
 
 
-@pytest.mark.parametrize(("changes", "check", "cause"), MISTAKES)
-def test_a_well_known_mistake_fails_its_check_and_is_named(changes, check, cause):
+@pytest.mark.parametrize(("changes", "check"), MISTAKES)
+def test_a_well_known_mistake_fails_its_check_by_its_figure(changes, check):
     failed = found(written(**changes), check)
     assert failed.verdict == "FAIL"
-    assert cause in failed.note
-    assert "\n" not in failed.note
+    assert failed.value > failed.bound
+    assert not failed.note
+
+
+@pytest.mark.parametrize(("changed", "words"), [(torch.abs, "float"), (lambda image: image[None], "(1, 128, 128)")])
+def test_a_result_that_is_no_field_is_told_as_what_it_is(changed, words):
+    failed = found(written(forward=lambda self, field: changed(Written.forward(self, field))), "energy")
+    assert failed.verdict == "FAIL"
+    assert words in failed.note
 
 
 @pytest.mark.parametrize(
-    ("factor", "cause"), [(0.0, "nothing but zeros"), (math.nan, "not finite"), (math.inf, "not finite")]
+    ("factor", "words"), [(0.0, "nothing but zeros"), (math.nan, "not finite"), (math.inf, "not finite")]
 )
 @pytest.mark.parametrize("own_adjoint", [False, True])
-def test_zeros_and_what_is_not_finite_fail_every_check_as_what_they_are(factor, cause, own_adjoint):
+def test_zeros_and_what_is_not_finite_fail_every_check_as_what_they_are(factor, words, own_adjoint):
     def forward(self, field):
         return Written.forward(self, field) * factor
 
     findings = check_propagator(written(forward=forward, **({"adjoint": forward} if own_adjoint else {})))
     assert {each.verdict for each in findings} == {"FAIL"}
-    assert {cause in each.note for each in findings} == {True}
+    assert {words in each.note for each in findings} == {True}
 
 
 def test_the_same_propagator_without_a_mistake_passes():
@@ -124,15 +129,8 @@ def test_shifts_that_differ_at_odd_sizes_alone_pass_at_even_ones():
     assert found(written(flaw="shift", padding=3), "white field, 96").verdict == "PASS"
 
 
-def test_no_mistake_is_named_beside_the_one_that_explains_all():
-    assert found(written(flaw="paraxial"), "white field, 96").note == "a paraxial (Fresnel) model"
-    assert found(written(flaw="wrong sign"), "direct sum").note == "wrong sign of the distance or phase"
-
-
 def test_an_exact_model_is_not_the_paraxial_one_that_it_claims_to_be():
-    failed = found(Written, "white field, 96", physics="paraxial")
-    assert failed.verdict == "FAIL"
-    assert "an exact model" in failed.note
+    assert found(Written, "white field, 96", physics="paraxial").verdict == "FAIL"
 
 
 def test_a_low_pass_that_is_claimed_passes():
@@ -193,16 +191,6 @@ def test_the_reason_why_there_is_no_gradient_is_given(forward, reason):
     assert reason in result.note
 
 
-def test_a_forward_that_is_not_linear_has_no_adjoint():
-    def normalised(self, field):
-        image = Written.forward(self, field)
-        return image / image.abs().max()
-
-    failed = found(written(forward=normalised), "adjointness")
-    assert failed.verdict == "FAIL"
-    assert "not linear" in failed.note
-
-
 @pytest.mark.parametrize("error", [ValueError("two\nlines"), SystemExit(3), MemoryError()])
 def test_an_exception_is_the_finding_of_one_check_and_not_the_end(error):
     def make(shape, pitch, wavelength, distance):
@@ -217,12 +205,13 @@ def test_an_exception_is_the_finding_of_one_check_and_not_the_end(error):
     assert "\n" not in failed.note
 
 
-def test_the_table_is_printed_with_causes_and_counted(capsys):
+def test_the_table_is_printed_and_counted(capsys):
     assert main() == 0
     out = capsys.readouterr().out
     assert out.count("12 passed, 0 failed, 0 not applicable") == len(SHIPPED)
     assert "FAIL" not in out
-    assert main({"mine": replace(SHIPPED["Fresnel"], physics="exact")}) == 1
+    assert main({"mine": Subject(InNumpy), "empty": Subject(written(forward=lambda self, field: 0 * field))}) == 1
     out = capsys.readouterr().out
-    assert "cause: a paraxial (Fresnel) model" in out
+    assert "reason: no adjoint, and no gradient through numpy" in out
+    assert "reason: the result is nothing but zeros" in out
     assert max(len(line) for line in out.splitlines()) <= 100

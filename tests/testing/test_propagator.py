@@ -73,8 +73,8 @@ def test_the_example_of_the_docs_passes_every_check(capsys):
     assert "12 passed, 0 failed, 0 not applicable" in capsys.readouterr().out
 
 
-def test_the_example_of_a_mistake_fails_with_its_cause(capsys):
+def test_the_example_of_a_mistake_fails_as_the_docs_say(capsys):
     assert exit_code(f"{EXAMPLES / 'half_bin.py'}:HalfBin") == 1
     out = capsys.readouterr().out
-    assert "frequencies half a sample off (linspace for fftfreq), padded 2x" in out
+    assert "6 passed, 6 failed, 0 not applicable" in out
     assert max(len(line) for line in out.splitlines()[1:]) <= 100

@@ -6,38 +6,117 @@ names the files of both, the earlier and the new one, so that the same command g
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import StorageError, UserError
-from ...core.io import TEMPORARY, write_atomically
+import pandas as pd
+
+from ...core.errors import StorageError, UserError, reason
+from ...core.io import TEMPORARY, read_text, write_atomically
+from ...study.running import provenance
+from ..compare.paired import read_run
+from ..data.layout import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE, Layout, network_of
+from ..data.results import Results
+from ..data.tables import GUARDED, MOST_BYTES, clusters_in, records_text, score_columns
 from ..page.html import asset
 from .html import page, slug
-from .intake import Source, folded, folders, read
-from .pages import about, cards, places, studies
+from .pages import Study, about, cards, places
+from .pictures import figures
 
 MARK = "files-of-the-site.txt"
 
 
-def write_site(given: Sequence[Path], output: Path, own: Path) -> tuple[int, list[Path]]:
+def write_site(given: Sequence[Path], output: Path) -> tuple[int, list[Path]]:
     """Write the site over folders of reports; return how many there are, and the folders beside them without any.
 
-    given: reports, or folders of reports; own: the folder below which reports are own ones. UserError: a folder that
-    does not pass the checks, or an output that holds anything else than a site. Nothing is written then.
+    given: reports, or folders of reports. UserError: a file of a report is damaged or missing, or the output holds
+    anything else than a site. Nothing is written then.
     """
-    found, without = folders(given)
-    earlier = _earlier(output, found)
-    sources = [read(folder, own) for folder in found]
-    _check_names(sources)
-    contents = _whole(_contents(sources, without))
+    reports, without = _folders(given)
+    earlier = _earlier(output, reports)
+    studies = dict[str, Study]()
+    for folder in reports:  # those of one name are numbered
+        name, count = slug(folder.resolve().name), 1
+        while name in studies:
+            count += 1
+            name = f"{slug(folder.resolve().name)}-{count}"
+        studies[name] = _study(folder, name)
+    contents = dict(_contents([*studies.values()], without))
     _write_mark(output, {*contents, *earlier})
     for name, content in contents.items():
         write_atomically(output / name, content)
     _remove(output, earlier - set(contents))
     _write_mark(output, set(contents))
-    return len(sources), without
+    return len(studies), without
+
+
+def _folders(given: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """The folders of reports, and those beside them that hold none. UserError: no report in one of those given."""
+    found: dict[Path, Path] = {}
+    without: list[Path] = []
+    for folder in given:
+        if not folder.is_dir():
+            raise UserError(f"{folder}: no such folder; expected a report, or a folder of reports")
+        below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+        reports = [folder] if _is_report(folder) else [path for path in below if _is_report(path)]
+        if not reports:
+            raise UserError(f"{folder}: no report in it; expected records.csv, here or a level below")
+        without += [path for path in below if path not in reports and reports != [folder]]
+        found |= {path.resolve(): path for path in reports if path.resolve() not in found}
+    return list(found.values()), without
+
+
+def _is_report(folder: Path) -> bool:
+    return any((folder / name).exists() for name in ("records.csv", provenance.FILE))
+
+
+def _study(folder: Path, slugged: str) -> Study:
+    """Read a report for its page. UserError: one of its files is missing or damaged."""
+    run, name = read_run(folder), folder.resolve().name
+    if not run.provenance:
+        raise UserError(f"{folder / provenance.FILE}: missing; run the study again")
+    try:
+        frame = run.records
+        drawn = json.loads(read_text(folder / "board.json", MOST_BYTES))
+        table = pd.read_csv(io.StringIO(records_text(folder / "table.csv")), dtype=str, keep_default_na=False)
+        networks = table["parameters"].map(lambda text: network_of(json.loads(text or "{}")))
+        displays = frame.loc[(frame["condition"] == frame["display"]) & (frame["category"] != FLOOR), "condition"]
+        nominal = frame[(frame["category"] == FLOOR) | frame["condition"].isin(displays)].reset_index(drop=True)
+        shown = nominal[nominal["category"] != FLOOR]
+        by_category = {each: frozenset(shown.loc[shown["category"] == each, "label"]) for each in CATEGORIES}
+        learned = shown.loc[shown["learned_sha256"] != "", "label"] if "learned_sha256" in shown else ()
+        layout = Layout(
+            title=name,
+            pairs=tuple(dict.fromkeys(zip(shown["label"], shown["condition"], strict=True))),
+            targets=tuple(dict.fromkeys(nominal["target"])),
+            headline=drawn["headline"]["key"],
+            baseline=drawn["baseline"],
+            privileged=by_category[ORACLE],
+            trained=by_category[CALIBRATED] | frozenset(learned),
+            blind=by_category[OPEN_LOOP],
+            camera=by_category[ONLINE],
+            identities=frozenset(table.loc[networks == "identity", "label"].replace(GUARDED, r"\1", regex=True)),
+            measure=str(nominal["measure"].iloc[0]),
+            clusters=clusters_in(nominal),
+            study=name,
+        )
+        results = Results(nominal, layout)
+        if layout.measure != "error_budget":  # which is made of further scores than those that a site shows
+            kept = {score.column for score in (results.headline, *results.beside)}
+            results = replace(results, frame=nominal.drop(columns=[*{*score_columns(nominal)} - kept]))
+        changed = frame["condition"].nunique() - nominal["condition"].nunique()
+        pictures = figures(folder, results.conditions, slugged)
+        study = Study(name, results, run.provenance, str(drawn["question"]), changed, slugged, *pictures)
+        if not study.boards:
+            raise UserError("no row of an unchanged display in records.csv")
+    except Exception as error:  # whatever a damaged file leads to
+        raise UserError(f"{folder}: {reason(error)}; mend its files, or write the report again") from error
+    return study
 
 
 def _earlier(output: Path, found: Sequence[Path]) -> set[str]:
@@ -79,29 +158,9 @@ def _remove(output: Path, names: set[str]) -> None:
         raise StorageError(reason) from error
 
 
-def _check_names(sources: Sequence[Source]) -> None:
-    """UserError: two labs whose names differ by case or space alone."""
-    found: dict[str, Source] = {}
-    for source in sources:
-        other = found.setdefault(folded(source.by), source)
-        if other.by != source.by:
-            raise UserError(f"{source.folder}: by {source.by!r}, but {other.by!r} in {other.folder}; expected one name")
-
-
-def _whole(contents: Iterable[tuple[str, bytes]]) -> dict[str, bytes]:
-    """Every file by its path. UserError: two of one path."""
-    found: dict[str, bytes] = {}
-    for name, content in contents:
-        if name in found:
-            raise UserError(f"{name}: two files of the site would have this name; give their originals other names")
-        found[name] = content
-    return found
-
-
-def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
+def _contents(found: Sequence[Study], without: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
     """(path below the site, bytes) of every file."""
-    found = studies(sources)
-    names = sorted({name for study in found for name in study.source.results.names.values()})
+    names = sorted({name for study in found for name in study.results.names.values()})
     displays, methods = cards(found), {name: rows for name in names if (rows := places(found, name))}
     yield "assets/page.css", asset("page.css").encode()
     yield "assets/site.css", (files(__package__) / "assets" / "site.css").read_bytes()
@@ -109,14 +168,12 @@ def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tu
     title = "Which phase-retrieval method, on which display?"
     yield "index.html", page("index", up="", title=title, about=about, **values)
     for name, own in displays.items():
-        headed = [(f"{each.of.source.name}{each.of.whose}", each) for each in own]
+        headed = [(each.of.name, each) for each in own]
         sheets = next((each.sheets for each in own if each.sheets), [])
         values = {"about": own[0].about, "boards": headed, "pictures": sheets, "notes": "", "facts": []}
         yield f"displays/{slug(name)}.html", page("boards", title=f"Display {name}", **values)
     for name, rows in methods.items():
-        pictures = [picture for study in found for picture in study.thumbnails if picture.of == name]
-        text = page("method", title=name, about=about(name), places=rows, pictures=pictures)
-        yield f"methods/{slug(name)}.html", text
+        yield f"methods/{slug(name)}.html", page("method", title=name, about=about(name), places=rows)
     for study in found:
         shown = [picture.path for each in study.boards for picture in each.pictures]
         values = {
@@ -126,6 +183,5 @@ def _contents(sources: Sequence[Source], without: Sequence[Path]) -> Iterator[tu
             "notes": study.notes,
             "facts": study.facts,
         }
-        yield f"studies/{study.slug}.html", page("boards", title=f"{study.source.name}{study.whose}", **values)
-        placed = (*study.figures, *study.thumbnails, *study.sheets)
-        yield from ((picture.path, picture.content) for picture in placed)
+        yield f"studies/{study.slug}.html", page("boards", title=study.name, **values)
+        yield from ((picture.path, picture.content) for picture in (*study.figures, *study.sheets))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from inspect import getdoc
+from typing import Any
 
 from ...core import plugins
 from ...core.errors import UserError
@@ -15,23 +15,30 @@ from ...display.simulated.profile import load_profile, names
 from ...display.simulated.shelf import installed
 from ..answers.comparison import of_display
 from ..data.board import Board, Display, Row, board
+from ..data.results import Results
 from ..data.text import grouped
-from .html import slug
-from .intake import Source, text_of
-from .pictures import STAGES, Picture, figures, thumbnails
+from .pictures import STAGES, Picture
 
 BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays
-FACTS = ("by", "package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu",
-         "gpu", "device", "threads", "workers", "started", "ended")  # fmt: skip
+FACTS = ("package", "harness", "revision", "dirty", "command", "config_sha256", "python", "platform", "cpu", "gpu",
+         "device", "threads", "workers", "started", "ended")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Study:
-    """A source with its pictures. slug: of its page; sheets: of the stages of its displays; left: figures left out."""
+    """A report.
 
-    source: Source
+    name: of its study; results: its numbers without changed displays; known: its provenance; question: of the study;
+    changed: how many conditions are a change of a display; slug: of its page; sheets: of the stages of its displays;
+    left: how many figures are left out.
+    """
+
+    name: str
+    results: Results
+    known: Mapping[str, Any]
+    question: str
+    changed: int
     slug: str
-    thumbnails: list[Picture]
     figures: list[Picture]
     sheets: list[Picture]
     left: int
@@ -39,43 +46,34 @@ class Study:
     @property
     def enters(self) -> bool:
         """Whether it enters the pages of displays."""
-        return self.source.known.get(BOARD) is True
+        return self.known.get(BOARD) is True
 
     @property
-    def whose(self) -> str:
-        """Words behind its name."""
-        return f", by {self.source.by}" if self.source.by else ""
-
-    @property
-    def question(self) -> str:
-        """What report.md of an own study asks; of others what they have named."""
-        try:
-            return "" if self.source.by else str(json.loads(text_of(self.source.folder / "board.json"))["question"])
-        except (ValueError, KeyError, TypeError, RecursionError):
-            return ""
+    def processor(self) -> str:
+        """What the seconds were taken on."""
+        return str(self.known.get("gpu") or self.known.get("cpu") or "processor not recorded")
 
     @property
     def facts(self) -> list[tuple[str, str]]:
         """What the provenance says of it."""
-        known = self.source.known
-        return [(name, str(known[name])) for name in FACTS if known.get(name) not in (None, "")]
+        return [(name, str(self.known[name])) for name in FACTS if self.known.get(name) not in (None, "")]
 
     @property
     def notes(self) -> str:
         """What its page leaves out."""
-        changed = self.source.changed
-        notes = [f"{self.left} more figures are in its folder."] if self.left else []
-        return " ".join([*notes, *([f"{changed} conditions are changes of a display, and not shown."] * bool(changed))])
+        left = [f"{self.left} more figures are in its folder."] * bool(self.left)
+        changed = [f"{self.changed} conditions are changes of a display, and not shown."] * bool(self.changed)
+        return " ".join(left + changed)
 
     @cached_property
     def board(self) -> Board:
         """Of its displays."""
-        return board(self.source.results)
+        return board(self.results)
 
     @cached_property
     def boards(self) -> list[Shown]:
         """A display each."""
-        return [Shown(self, display, *_identity(self.source, display.name)) for display in self.board.displays]
+        return [Shown(self, display, *_identity(self, display.name)) for display in self.board.displays]
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ class Shown:
     @property
     def panel(self) -> str:
         """Its size, where that is known."""
-        frame = self.of.source.results.frame
+        frame = self.of.results.frame
         sides = frame.loc[frame["display"] == self.display.name, ["panel_height_px", "panel_width_px"]].dropna()
         return "".join(f", panel of {height:.0f} x {width:.0f} pixels" for height, width in sides.head(1).to_numpy())
 
@@ -103,7 +101,7 @@ class Shown:
     @property
     def verdict(self) -> str:
         """Of a comparison of pictures."""
-        results = self.of.source.results
+        results = self.of.results
         return of_display(results, self.display) if results.layout.measure == "picture" else ""
 
     @property
@@ -118,34 +116,22 @@ class Shown:
         return [picture for picture in self.of.sheets if picture.of == f"{STAGES}{self.display.name}"]
 
 
-def studies(sources: Sequence[Source]) -> list[Study]:
-    """The studies with their pictures; folders of one name are numbered."""
-    found: dict[str, Study] = {}
-    for source in sources:
-        name, count = slug(source.name), 1
-        while name in found:
-            count += 1
-            name = f"{slug(source.name)}-{count}"
-        found[name] = Study(source, name, thumbnails(source, name), *figures(source, name))
-    return list(found.values())
-
-
-def _identity(source: Source, name: str) -> tuple[str, str]:
+def _identity(study: Study, name: str) -> tuple[str, str]:
     """Title and description of a display, and of a twin how far it can be trusted.
 
     They are those of this package, or of another, that has the display by this digest.
 
-    Another display or version has the beginning of its digest beside its name, or its lab.
+    Another display or version has the beginning of its digest beside its name, or its study.
     """
-    kind = source.known.get("displays", {}).get(name, "simulated")
-    digest = source.known.get("profiles", {}).get(name, {}).get("sha256", "")
+    kind = study.known.get("displays", {}).get(name, "simulated")
+    digest = study.known.get("profiles", {}).get(name, {}).get("sha256", "")
     known = [name] if name in {*names(), *names(family=True)} else []
     for shown in [*known, *installed()] if kind == "simulated" else ():
         with suppress(UserError):  # of others' files
             if (profile := load_profile(shown)).digest == digest:
                 trust = profile.twin.words
                 return shown, f"{profile.description}{f' It is {trust}.' if trust else ''}"
-    other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or source.by or source.name)))
+    other = ", ".join(filter(None, (kind if kind != "simulated" else "", digest[:8] or study.name)))
     return f"{name} ({other})", "Another display, or another version of one, than is installed here."
 
 
@@ -156,19 +142,18 @@ def places(found: Sequence[Study], method: str) -> list[tuple[Shown, Row]]:
         for study in found
         for shown in study.boards
         for row in shown.display.rows
-        if study.source.results.names[row.label] == method
+        if study.results.names[row.label] == method
     ]
 
 
 @lru_cache(maxsize=256)
 def about(method: str) -> str:
-    """What a method of the package is. Others' files are not opened."""
+    """What a method of the package is. Files of users are not opened."""
     if method not in plugins.names("methods"):
         return "A method that does not come with this package; its folder of results tells nothing of its code."
     return " ".join((getdoc(plugins.find("methods", method)) or "").partition("\n\n")[0].replace("`", "").split())
 
 
 def cards(found: Sequence[Study]) -> dict[str, list[Shown]]:
-    """The boards that enter, by the title of their display, own ones first."""
-    entering = sorted((study for study in found if study.enters), key=lambda study: bool(study.source.by))
-    return grouped((each.title, each) for study in entering for each in study.boards)
+    """The boards that enter, by the title of their display."""
+    return grouped((each.title, each) for study in found if study.enters for each in study.boards)

@@ -85,7 +85,7 @@ def test_photographs_through_files_score_as_the_direct_run_does_and_are_read_onc
     for row in (("double_phase", "leto-mild"), ("wirtinger", "leto-mild")):
         for column, error in (("psnr_linear_db", 0.1), ("ssim_linear", 0.01)):
             assert ours.loc[row, column] == pytest.approx(direct.loc[row, column], abs=error)
-    run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site", "--own", folder)
+    run("site", folder / "bench" / "report", folder / "direct", "--output", folder / "site")
     titles = {
         name: re.findall(r"<h2>(leto-mild.*)</h2>", (folder / "site" / "studies" / f"{name}.html").read_text())
         for name in ("report", "direct")

@@ -20,7 +20,7 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, monkeypatch, call):
     monkeypatch.chdir(tmp_path)
     for folder, message in (
         ("nowhere", "nowhere: no such folder; expected a report, or a folder of reports"),
-        (".", ".: no report in it; expected records.csv and provenance.json"),
+        (".", ".: no report in it; expected records.csv, here or a level below"),
     ):
         code, _, error = call("site", folder)
         assert (code, error.count("\n")) == (2, 1)

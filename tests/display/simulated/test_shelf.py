@@ -75,7 +75,7 @@ def test_the_site_has_a_card_of_an_installed_display_by_its_name_and_words(insta
     records = synthetic.study(tmp_path / "study", size=16, targets=TARGETS)
     digests = {"leto-aged": load_profile("lab-x/bench").digest, "ideal": load_profile("ideal").digest}
     known = {"profiles": {name: {"version": 1, "sha256": sha256} for name, sha256 in digests.items()}}
-    write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site", tmp_path)
+    write_site([write_results(tmp_path / "ours", records, known=known)], tmp_path / "site")
     page = (tmp_path / "site" / "displays" / f"{slug('lab-x/bench')}.html").read_text()
     assert "A display of lab X. It is a twin of leto-aged, trained with 59 photographs" in page
     assert "lab-x/bench" in page

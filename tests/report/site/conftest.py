@@ -1,6 +1,5 @@
-"""A site over an own report and the folder of somebody else, whose names try to be markup, formulas and paths."""
+"""A site over a report and another, whose names try to be markup, formulas and paths."""
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,13 @@ from tests.support.results_folder import TARGETS, write_results
 
 HOSTILE = '=cmd|"</script><script>alert(1)</script><img src=x onerror=alert(2)>'
 PATH = "../../<b>evil</b>.py:Method"
-LAB = "<i>Their</i> lab"
-THEIRS = "<u>theirs"  # the name of their folder
+THEIRS = "<u>theirs"  # the name of the other folder
 OTHER = "2" * 64  # a digest that no profile of the package has
 
 
 @dataclass(frozen=True)
 class Site:
-    """The folders that were handed in, and where the site is."""
+    """The folders of the reports, and where the site is."""
 
     own: Path
     other: Path
@@ -36,8 +34,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return synthetic.study(tmp_path_factory.mktemp("study"), size=16, targets=TARGETS)
 
 
-def of_others(study: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The same study by others: a method of their own in the place of HIL, a dB better, solved again."""
+def renamed(study: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The same study with another method in the place of HIL, a dB better, solved again."""
     changed = []
     for record in study:
         cell, scores, label = dict(record["cell"]), dict(record["scores"]), record["label"]
@@ -53,17 +51,11 @@ def of_others(study: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def site(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) -> Site:
     folder = tmp_path_factory.mktemp("site")
     own = write_results(folder / "reports" / "ours", study)
-    other = write_results(folder / "others" / THEIRS, of_others(study), by=LAB)
-    write_site([own.parent, other], folder / "site", own.parent)
+    other = write_results(folder / "others" / THEIRS, renamed(study))
+    write_site([own.parent, other], folder / "site")
     return Site(own, other, folder / "site")
 
 
 @pytest.fixture(scope="session")
 def passing(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) -> Path:
-    return write_results(tmp_path_factory.mktemp("passing") / "theirs", study, by="Their lab", thumbnails=2)
-
-
-@pytest.fixture
-def handed_in(tmp_path: Path, passing: Path) -> Path:
-    """A folder of others that passes."""
-    return Path(shutil.copytree(passing, tmp_path / "theirs"))
+    return write_results(tmp_path_factory.mktemp("passing") / "theirs", study)

@@ -1,8 +1,8 @@
-"""The site: links stay inside, names stay text, files of others stay, and everybody can read it."""
+"""The site: links stay inside, names stay text, files of somebody stay, and everybody can read it."""
 
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -18,7 +18,7 @@ from tests.support.axe import serious
 from tests.support.reports import files
 from tests.support.results_folder import write_results
 
-from .conftest import HOSTILE, LAB, OTHER, PATH, THEIRS, Site
+from .conftest import HOSTILE, OTHER, PATH, THEIRS, Site
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_names_open_no_element_and_become_no_path_and_the_policy_lets_nothing_in
         assert "unsafe" not in page.policy
         assert "http" not in page.policy
     index = pages[site.output / "index.html"]
-    for name in (LAB, THEIRS, PATH):
+    for name in (THEIRS, PATH):
         assert name in index.text
     assert HOSTILE in pages[site.output / "displays" / "leto-aged.html"].text
     assert all(path.resolve().is_relative_to(site.output) for path in site.output.rglob("*"))
@@ -72,8 +72,8 @@ def test_equal_folders_give_equal_bytes_and_nothing_of_an_earlier_site_is_left(s
     shutil.copytree(site.own, moved / "reports" / "ours")
     shutil.copytree(site.other, moved / "others" / site.other.name)
     stale = write_results(moved / "stale", study, known={"harness": "3"})
-    write_site([stale], moved / "site", moved)
-    write_site([moved / "reports", moved / "others"], moved / "site", moved / "reports")
+    write_site([stale], moved / "site")
+    write_site([moved / "reports", moved / "others"], moved / "site")
     first, second = (
         {path.relative_to(root): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
         for root in (site.output, moved / "site")
@@ -99,7 +99,7 @@ def test_a_method_with_other_settings_or_without_any_score_is_a_row_of_its_own(t
     more = [record | {"label": "HIL, 12", "cell": record["cell"] | {"captures": 12}} for record in hil]
     lost = {"state": "failed", "scores": {}, "reason": "no light"}
     records = [record | (lost if record["label"] == "SGD" else {}) for record in (*study, *more)]
-    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site", tmp_path)
+    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site")
     page = (tmp_path / "site" / "methods" / "hil.html").read_text()
     assert page.count("A HIL: ") == page.count("A HIL, 12: ") == 2
     page = (tmp_path / "site" / "displays" / "leto-aged.html").read_text()
@@ -108,25 +108,20 @@ def test_a_method_with_other_settings_or_without_any_score_is_a_row_of_its_own(t
 
 def test_only_studies_that_ask_for_it_enter_the_displays_with_their_question_as_text(tmp_path, study) -> None:
     folder, site = write_results(tmp_path / "ours", study, known={"board": False}), tmp_path / "site"
-    (folder / "board.json").write_text(json.dumps({"question": "Is it <b>better</b>?"}))
-    write_site([folder], site, tmp_path)
+    board = json.loads((folder / "board.json").read_text())
+    (folder / "board.json").write_text(json.dumps(board | {"question": "Is it <b>better</b>?"}))
+    write_site([folder], site)
     assert not (site / "displays").exists()
     assert "No study says" in (site / "index.html").read_text()
     for name in ("index.html", "studies/ours.html"):
         assert "Is it &lt;b&gt;better&lt;/b&gt;?" in (site / name).read_text()
-    (folder / "board.json").write_text("[1")
-    write_site([folder], site, tmp_path)
-    assert "Is it" not in (site / "index.html").read_text()
 
 
 def test_a_display_of_another_version_has_a_page_of_its_own(tmp_path: Path, study: list[dict[str, Any]]) -> None:
     known = {"profiles": {name: {"version": 1, "sha256": OTHER} for name in ("leto-aged", "ideal")}}
-    write_site([write_results(tmp_path / "ours", study, known=known)], tmp_path / "site", tmp_path)
+    write_site([write_results(tmp_path / "ours", study, known=known)], tmp_path / "site")
     page = (tmp_path / "site" / "displays" / f"{slug('ideal (22222222)')}.html").read_text()
     assert "Another display, or another version of one" in page
-
-
-OWN = Path("reports")
 
 
 @pytest.mark.parametrize(
@@ -140,34 +135,34 @@ OWN = Path("reports")
 )
 def test_files_of_somebody_in_the_output_are_refused_and_kept(tmp_path, passing, is_site, names) -> None:
     if is_site:
-        write_site([passing], tmp_path, OWN)
+        write_site([passing], tmp_path)
     for name in names:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("mine")
     before = files(tmp_path)
     with pytest.raises(UserError, match="which is no file of a site"):
-        write_site([passing], tmp_path, OWN)
+        write_site([passing], tmp_path)
     assert files(tmp_path) == before
 
 
 @pytest.mark.parametrize("name", ["methods", "index.html", "files-of-the-site.txt"])
 def test_nothing_is_written_through_a_link(tmp_path: Path, passing: Path, name: str) -> None:
     site, outside = tmp_path / "site", tmp_path / "outside"
-    write_site([passing], site, OWN)
+    write_site([passing], site)
     (site / name).rename(outside)
     (site / name).symlink_to(outside)
     before = files(outside) if outside.is_dir() else outside.read_bytes()
     with pytest.raises(UserError, match="which is no file of a site"):
-        write_site([passing], site, OWN)
+        write_site([passing], site)
     assert (files(outside) if outside.is_dir() else outside.read_bytes()) == before
 
 
 @pytest.mark.parametrize(("left", "earlier"), [(0, True), (1, False), (5, True)])
 def test_a_site_that_was_interrupted_is_written_by_the_same_command(tmp_path, passing, study, left, earlier) -> None:
     expected, site = tmp_path / "expected", tmp_path / "site"
-    write_site([passing], expected, OWN)
+    write_site([passing], expected)
     if earlier:
-        write_site([write_results(tmp_path / "stale", study, by="Another lab")], site, OWN)
+        write_site([write_results(tmp_path / "stale", study)], site)
 
     def full(path: Path, content: bytes) -> None:
         nonlocal left
@@ -181,29 +176,66 @@ def test_a_site_that_was_interrupted_is_written_by_the_same_command(tmp_path, pa
         write = build.write_atomically
         patch.setattr(build, "write_atomically", full)
         with pytest.raises(StorageError):
-            write_site([passing], site, OWN)
-    write_site([passing], site, OWN)
+            write_site([passing], site)
+    write_site([passing], site)
     assert files(site) == files(expected)
 
 
-def test_two_files_of_one_name_are_refused_and_a_figure_and_a_thumbnail_are_two(tmp_path, handed_in: Path) -> None:
-    path = sorted((handed_in / "thumbnails").iterdir())[0]
-    (handed_in / "figures").mkdir()
-    for name in (path.name, "Quality-a.png", "quality-A.png"):
-        (handed_in / "figures" / name).write_bytes(path.read_bytes())
-    write_site([handed_in], tmp_path / "site", OWN)
-    pictures = tmp_path / "site" / "pictures" / "theirs"
-    assert len([each for each in pictures.iterdir() if each.is_file()]) == 3
-    assert len(list((pictures / "captures").iterdir())) == 2
-    path.with_suffix(".PNG").write_bytes(path.read_bytes())
-    with pytest.raises(UserError, match="two files of the site would have this name"):
-        write_site([handed_in], tmp_path / "another", OWN)
+def changed(name: str, change: Callable[[str], str]) -> Callable[[Path], object]:
+    """Write the text of a file anew."""
+    return lambda folder: (folder / name).write_text(change((folder / name).read_text()))
 
 
-def test_labs_whose_names_differ_by_case_or_space_alone_are_refused(tmp_path: Path, study) -> None:
-    folders = [write_results(tmp_path / name, study, by=name) for name in ("Our Lab", "our  lab")]
-    with pytest.raises(UserError, match="expected one name"):
-        write_site(folders, tmp_path / "site", OWN)
+def without(name: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).unlink()
+
+
+def told(**values: Any) -> Callable[[Path], object]:
+    """Change the provenance."""
+    return changed("provenance.json", lambda text: json.dumps(json.loads(text) | values))
+
+
+def with_half_a_figure(folder: Path) -> None:
+    (folder / "figures").mkdir()
+    (folder / "figures" / "quality-a.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        *((without(name), name) for name in ("records.csv", "provenance.json", "board.json", "table.csv")),
+        (changed("records.csv", lambda text: text.partition("\n")[0]), "mend its files"),
+        (changed("records.csv", lambda text: text.replace("psnr_linear_db", "psnr_linear_x")), "psnr_linear"),
+        (changed("records.csv", lambda text: 'a,b\n"1'), "tokenizing data"),
+        (changed("board.json", lambda text: text[:9]), "JSONDecodeError"),
+        (changed("board.json", lambda text: "[" * 10**5), "RecursionError"),
+        (changed("board.json", lambda text: "[]"), "mend its files"),
+        (changed("table.csv", lambda text: "a\n1\n"), "parameters"),
+        (changed("provenance.json", lambda text: "[]"), "not the provenance of a run"),
+        (told(profiles=[]), "mend its files"),
+        (told(profiles={"ideal": {"sha256": 1}}), "mend its files"),
+        (lambda folder: (folder / "report.md").write_bytes(b"\xff"), "UnicodeDecodeError"),
+        (with_half_a_figure, "figures/quality-a.png is not a whole picture"),
+    ],
+)
+def test_a_damaged_or_missing_file_is_one_line_that_names_the_folder(tmp_path, passing, damage, words) -> None:
+    folder = Path(shutil.copytree(passing, tmp_path / "ours"))
+    damage(folder)
+    with pytest.raises(UserError) as error:
+        write_site([folder], tmp_path / "site")
+    assert "\n" not in str(error.value)
+    assert str(folder) in str(error.value)
+    assert words in str(error.value)
+    assert not (tmp_path / "site").exists()
+
+
+def test_a_folder_without_records_is_named_and_an_output_that_overlaps_is_refused(tmp_path, passing) -> None:
+    shutil.copytree(passing, tmp_path / "all" / "good")
+    (tmp_path / "all" / "timings").mkdir()
+    with pytest.raises(UserError, match="overlaps"):
+        write_site([tmp_path / "all"], tmp_path / "all" / "good" / "site")
+    assert write_site([tmp_path / "all"], tmp_path / "site") == (1, [tmp_path / "all" / "timings"])
+    assert "timings: no records.csv, left out" in (tmp_path / "site" / "index.html").read_text()
 
 
 @pytest.fixture
