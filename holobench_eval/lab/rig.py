@@ -17,14 +17,13 @@ from ..imaging.convention import Convention
 from .bench_file import CaptureSettings
 from .dark import Dark, given_dark
 from .devices import Camera, DeviceError, SequenceSlm, Slm
-from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames, exposed, miscounted, refuse_late
+from .exposure import FreshCamera, auto_exposure, averaged, combined, dark_frames, refuse_late, refuse_miscounted
 from .laser import Laser
 from .photograph import Photograph, Request, plane_of
 from .preflight import Check, full_turn, linearity, phase_sign
 from .settle import PATIENCE, Toggle, refuse_old, settle_time
 
 DARK_SPAN = 1 / 8, 2.0  # of the exposures in use: between these, dark counts are measured, beyond extrapolated
-FAR = 8.0  # times an exposure: bright samples are saturated
 TRIES = 2  # of every photograph, since drivers drop a frame now and then
 
 
@@ -108,9 +107,10 @@ class Rig:
         """
         self._check_phase(pattern.phase)
         try:
-            self._show(pattern.phase, 0, self.convention, self._longest)
+            longest = PATIENCE if self.settings.settle == "auto" else self.settings.settle
+            self._show(pattern.phase, 0, self.convention, longest)
             refuse_late(self.camera, self.planes[0])
-            exposures = tuple(self._exposure(pattern, channel) for channel in range(len(self.planes)))
+            exposures = tuple(self._exposure(pattern, channel, longest) for channel in range(len(self.planes)))
             say(f"exposure: {', '.join(f'{seconds:.3g} s' for seconds in exposures)}")
             settle = self._settle(pattern.phase, exposures[0] * pattern.relative_exposure)
             say(f"settling: {settle * 1e3:.0f} ms{'' if self.settings.settle == 'auto' else ' (as set)'}")
@@ -137,17 +137,12 @@ class Rig:
         finally:
             self.camera.close()
 
-    def _exposure(self, pattern: Request, channel: int) -> float:
-        given = self.settings.exposures(len(self.planes))
-        if given is not None:
-            return given[channel]
-        self._show(pattern.phase, channel, self.convention, PATIENCE)
-        return auto_exposure(self.camera, self.planes[channel]) / pattern.relative_exposure
-
-    @property
-    def _longest(self) -> float:
-        """Seconds after which everything has settled."""
-        return PATIENCE if self.settings.settle == "auto" else self.settings.settle
+    def _exposure(self, pattern: Request, channel: int, settle: float) -> float:
+        self._show(pattern.phase, channel, self.convention, settle)
+        given, plane = self.settings.exposures(len(self.planes)), self.planes[channel]
+        seconds = given[channel] if given else auto_exposure(self.camera, plane) / pattern.relative_exposure
+        refuse_miscounted(self.camera, seconds * pattern.relative_exposure, plane)
+        return seconds
 
     def _settle(self, phase: Tensor, seconds: float) -> float:
         self.laser.select(0)
@@ -157,8 +152,10 @@ class Rig:
             take=lambda: averaged(self.camera, seconds, 1, self.planes[0]).counts,
             wait=self.wait,
         )
-        refuse_old(toggle, self._longest)
-        return settle_time(toggle) if self.settings.settle == "auto" else self._longest
+        if self.settings.settle == "auto":
+            return settle_time(toggle)
+        refuse_old(toggle, self.settings.settle)
+        return self.settings.settle
 
     def _darks(self, exposures: Sequence[float]) -> tuple[Dark, ...]:
         if self.settings.dark is not None:
@@ -176,8 +173,6 @@ class Rig:
         for channel, (seconds, dark, plane) in enumerate(zip(ready.exposures, ready.darks, self.planes, strict=True)):
             self._show(pattern.phase, channel, self.convention, ready.settle)
             take = partial(averaged, self.camera, count=self.settings.average, plane=plane)
-            if fault := miscounted(exposed(self.camera, FAR * seconds, plane)[0], self.camera.white):
-                yield Check(False, f"{self.camera.name}: {fault}")
             check = linearity(take, seconds * pattern.relative_exposure, dark)
             yield replace(check, line=f"channel {channel}: {check.line}") if len(self.planes) > 1 else check
         single = replace(self.settings, average=1, hdr=(1.0,))  # many photographs, of which none is scored

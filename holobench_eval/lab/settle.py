@@ -9,16 +9,16 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
-from .exposure import late
+from .exposure import ORDER, WAITING, late
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
 TOLERANCE = 0.02  # of the change between the two patterns
 UNSTEADY = 0.1  # of the change: more from frame to frame, and nothing can be measured
 MARGIN = 1.5  # of the measured time
-REPEATS = 3
 FAINTEST = 0.05  # of the brighter picture: a smaller change between the two is none
 BLIND = "the picture does not change with the hologram; is this the panel that the camera sees?"
+LOOK = "look at the laser's power, the panel's flicker and its speed"
 BRIGHT = 0.9  # quantile: samples that change most tell
 
 
@@ -43,8 +43,11 @@ class Toggle:
         return self.take()
 
 
-def refuse_old(toggle: Toggle, seconds: float) -> None:
-    """DeviceError for a camera whose first picture, so long after a hologram was shown, is of the one before it."""
+def refuse_old(toggle: Toggle, seconds: float) -> tuple[list[Array], list[Array]]:
+    """Pictures of the bright and of the dark pattern, so long after they were shown.
+
+    DeviceError for a camera whose first one is of the pattern before.
+    """
     shown: list[int] = []
 
     def take(kind: int) -> Array:
@@ -54,13 +57,18 @@ def refuse_old(toggle: Toggle, seconds: float) -> None:
         shown.append(kind)
         return toggle.take()
 
-    if (count := late(take)) is None:
+    count, pictures = late(take)
+    if count is None:
         raise DeviceError(BLIND)
+    if count > WAITING:
+        raise DeviceError(f"the picture of a hologram still changes after {seconds:g} s; {LOOK}")
     if count:
         raise DeviceError(
             f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue "
             "of frames, trigger each, or let the panel settle for longer"
         )
+    bright, dark = ([each for each, kind in zip(pictures, ORDER, strict=True) if kind == wanted] for wanted in (0, 1))
+    return bright, dark
 
 
 def settle_time(toggle: Toggle) -> float:
@@ -89,12 +97,7 @@ def settle_time(toggle: Toggle) -> float:
 
 def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
     """How to read the level of a picture, and how much it varies (rms) when all has settled."""
-    bright, dark = ([toggle.after(kind, PATIENCE)] for kind in (True, False))
-    for pictures, kind in ((dark, False), (bright, True)):
-        toggle.show(kind)
-        for _ in range(REPEATS - 1):
-            toggle.wait(PATIENCE)
-            pictures.append(toggle.take())
+    bright, dark = refuse_old(toggle, PATIENCE)
     change = np.abs(bright[0] - dark[0])
     telling = change >= np.quantile(change, BRIGHT)
     base = float(max(np.mean(each[telling]) for each in (bright[0], dark[0])))
@@ -112,8 +115,5 @@ def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
         np.sqrt(np.mean([(level(each) - kind) ** 2 for kind, some in ((1, bright), (0, dark)) for each in some]))
     )
     if not span > 0 or noise > UNSTEADY:
-        raise DeviceError(
-            f"the picture of one and the same hologram still changes by {noise:.0%} after {PATIENCE:g} s; "
-            "look at the laser's power, the panel's flicker and its speed"
-        )
+        raise DeviceError(f"the picture of a hologram still changes by {noise:.0%} after {PATIENCE:g} s; {LOOK}")
     return level, noise

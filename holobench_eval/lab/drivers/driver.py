@@ -60,7 +60,9 @@ def load(name: str, what: str) -> Any:
     found = getattr(module, attribute, None)
     if not callable(found):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
-        raise UserError(f"{what} '{name}': there is no '{attribute}' in {source}; {suggest(attribute, own)}")
+        own = [key for key in own if callable(getattr(module, key))]
+        fault = "no class or function" if hasattr(module, attribute) else "not there"
+        raise UserError(f"{what} '{name}': '{attribute}' of {source} is {fault}; {suggest(attribute, own)}")
     return found
 
 

@@ -69,11 +69,15 @@ class Own:
         """See `Camera`; DeviceError for what is no photograph, and for whatever the device raises."""
         limit = READING + EXPOSURES * seconds
         given = self._worker.call("taking a picture", limit, lambda: self._device.expose(seconds))
-        if not isinstance(given, tuple) or len(given) != 2 or not isinstance(given[1], float | int | np.number):
-            raise DeviceError(f"{self.name}: expose returned {type(given).__name__}; expected (counts, seconds)")
-        frame = np.array(given[0])  # a copy, since a device may fill its memory again
+        try:
+            counts, real = given
+            frame, real = np.array(counts), float(real)  # a copy, since a device may fill its memory again
+        except (TypeError, ValueError):
+            types = [type(each).__name__ for each in given] if isinstance(given, tuple) else [type(given).__name__]
+            what = f"expose returned {', '.join(types)}; expected (counts, seconds)"
+            raise DeviceError(f"{self.name}: {what}") from None
         check_counts(self.name, frame, self.white, "; set white, or shift the counts down")
-        return frame, float(given[1])
+        return frame, real
 
     def close(self) -> None:
         """Give the device back."""

@@ -46,15 +46,15 @@ class Worker:
             return future.result(timeout=seconds)
         except (UserError, DeviceError):
             raise
-        except TimeoutError as error:
-            if future.done():  # the function's own
+        except BaseException as error:
+            if future.done():  # the function's own, sys.exit() among them
                 raise DeviceError(f"{self.name}: {what} failed: {line(error)}") from error
+            if not isinstance(error, TimeoutError):
+                raise
             self._lost = (
                 f"{self.name}: {what} took longer than {seconds:.3g} s; look at its cable and power, start again"
             )
             raise DeviceError(self._lost) from None
-        except Exception as error:
-            raise DeviceError(f"{self.name}: {what} failed: {line(error)}") from error
 
     def stop(self, seconds: float, function: Callable[[], Any]) -> None:
         """Call ``function`` a last time and end the thread; whatever goes wrong is past caring. Again does nothing."""

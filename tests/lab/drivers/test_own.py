@@ -98,10 +98,10 @@ def test_a_panel_and_a_camera_of_one_file_know_of_each_other_and_live_on_a_threa
         ("Camera", {"serial": 7}, "parameter 'serial': .* got 7"),
         ("Camera", {"serial": "7", "gian": 1}, "has no parameter 'gian'; did you mean 'gain'"),
         ("Camera", {"serial": "7", "gain": 5}, "parameter 'gain': .* less than or equal to 4, got 5"),
-        ("Camra", {}, "there is no 'Camra' in .*mine.py; did you mean 'Camera'"),
-        ("shown", {}, "there is no 'shown'"),
+        ("Camra", {}, "'Camra' of .*mine.py is not there; did you mean 'Camera'"),
+        ("shown", {}, "'shown' of .*mine.py is no class or function; allowed: .*Camera"),
         ("Broken", {}, r"'\*\*others' takes any parameters"),
-        ("", {}, "there is no ''"),
+        ("", {}, "'' of .*mine.py is not there"),
     ],
 )
 def test_a_wrong_name_or_parameter_is_one_line_before_any_device_moves(
@@ -161,7 +161,10 @@ def test_what_a_camera_lacks_is_said_with_what_would_be_right(key: str, value: A
     ("given", "line"),
     [
         (np.zeros((3, 4), np.uint16), "expose returned ndarray; expected (counts, seconds)"),
-        ((np.zeros((3, 4), np.uint16), None), "expected (counts, seconds)"),
+        ((np.zeros((3, 4), np.uint16), None), "expose returned ndarray, NoneType; expected (counts, seconds)"),
+        ((0.1, np.zeros((3, 4), np.uint16)), "expose returned float, ndarray; expected (counts, seconds)"),
+        (([[1, 2], [3]], 0.1), "expose returned list, float; expected (counts, seconds)"),
+        (None, "expose returned NoneType"),
         (
             ([[1, 2]], 0.1),
             "gave int64 of (1, 2); expected whole counts, uint8 or uint16 of (H, W) or (H, W, 3)",
