@@ -18,7 +18,6 @@ UNSTEADY = 0.1  # of the change: more from frame to frame, and nothing can be me
 MARGIN = 1.5  # of the measured time
 FAINTEST = 0.05  # of the brighter picture: a smaller change between the two is none
 BLIND = "the picture does not change with the hologram; is this the panel that the camera sees?"
-LOOK = "look at the laser's power, the panel's flicker and its speed"
 BRIGHT = 0.9  # quantile: samples that change most tell
 
 
@@ -61,7 +60,10 @@ def refuse_old(toggle: Toggle, seconds: float) -> tuple[list[Array], list[Array]
     if count is None:
         raise DeviceError(BLIND)
     if count > WAITING:
-        raise DeviceError(f"the picture of a hologram still changes after {seconds:g} s; {LOOK}")
+        raise DeviceError(
+            f"pictures {seconds:g} s after holograms were shown do not follow them; does the panel show the one "
+            "before, settle slowly or flicker, or the laser's power change?"
+        )
     if count:
         raise DeviceError(
             f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue "
@@ -115,5 +117,8 @@ def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
         np.sqrt(np.mean([(level(each) - kind) ** 2 for kind, some in ((1, bright), (0, dark)) for each in some]))
     )
     if not span > 0 or noise > UNSTEADY:
-        raise DeviceError(f"the picture of a hologram still changes by {noise:.0%} after {PATIENCE:g} s; {LOOK}")
+        raise DeviceError(
+            f"the picture of one and the same hologram still changes by {noise:.0%} after {PATIENCE:g} s; "
+            "look at the laser's power, the panel's flicker and its speed"
+        )
     return level, noise

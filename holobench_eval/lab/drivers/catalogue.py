@@ -12,7 +12,7 @@ from ...core.installed import installed, installing
 from ...core.plugins import made
 from ..devices import DeviceError
 from .driver import Driver, Kind
-from .own import Own, own_driver
+from .own import Own, opened, own_driver
 from .slmsuite_devices import theirs
 from .worker import line
 
@@ -44,14 +44,14 @@ class Survey:
     why: str
 
 
-def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
+def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Own:
     """The `Slm` or the `Camera` that ``driver`` opens with ``params``.
 
     UserError, in one line: an unknown driver or parameter, a wrong value, a package that is missing, no such device.
     DeviceError: it is there, but does not answer.
     """
     settings = checked_params(kind, driver, params)
-    return _driver(kind, driver).opens(settings)
+    return opened(_driver(kind, driver), settings)
 
 
 def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:

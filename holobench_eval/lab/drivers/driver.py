@@ -29,9 +29,10 @@ Kind = Literal["slm", "camera"]
 class Driver:
     """How devices of one kind are opened; every module that `catalogue` names lists its own as ``DRIVERS``.
 
-    name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it;
-    package: the distribution that it needs; extra: of this project, that installs it ("" for none); answering: lists
-    what answers, in words; unlisted: what to do where the package cannot look for devices by itself.
+    name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it,
+    called on a thread of the device's own; package: the distribution that it needs; extra: of this project, that
+    installs it ("" for none); answering: lists what answers, in words; unlisted: what to do where the package cannot
+    look for devices by itself.
     """
 
     kind: Kind

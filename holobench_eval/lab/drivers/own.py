@@ -53,7 +53,8 @@ class Own:
                 what = f"{key} is {getattr(device, key)!r}" if hasattr(device, key) else f"it has no '{key}'"
                 raise UserError(f"{name}: {what}; expected {right}")
         self._device, self._worker = device, worker or Worker(name)
-        self.name = self._worker.name = name
+        self.name, self._worker.idle = name, getattr(device, "idle", None)
+        self._worker.name = name
         if kind == "slm":
             self.shape = int(device.shape[0]), int(device.shape[1])
             if hasattr(device, "show_sequence"):
@@ -98,14 +99,11 @@ def own_driver(kind: Kind, name: str) -> Driver:
     except (TypeError, ValueError, NameError) as error:
         raise UserError(f"{owner}: its parameters cannot be taken from a bench file: {error}") from error
 
-    def opens(params: Any) -> Own:
-        return opened(kind, f"{kind} {cls.__name__}", lambda: cls(**vars(params)))
-
-    return Driver(kind, name, settings, opens, "", "", list)
+    return Driver(kind, name, settings, lambda params: cls(**vars(params)), "", "", list)
 
 
-def opened(kind: Kind, name: str, make: Callable[[], Any]) -> Own:
-    """A device that ``make`` gives, on a thread of its own. UserError and DeviceError as of `Own`."""
-    worker = Worker(name)
+def opened(driver: Driver, settings: Any) -> Own:
+    """The device of a driver, on a thread of its own. UserError and DeviceError as of `Own`."""
+    worker = Worker(f"{driver.kind} driver '{driver.name}'")
     with closed_on_failure(lambda: worker.stop(0, lambda: None)):
-        return worker.call("opening", OPENING, lambda: Own(kind, make(), worker))
+        return worker.call("opening", OPENING, lambda: Own(driver.kind, driver.opens(settings), worker))

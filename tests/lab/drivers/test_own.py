@@ -115,7 +115,7 @@ def test_a_wrong_name_or_parameter_is_one_line_before_any_device_moves(
 def test_what_cannot_be_opened_is_one_line(own: str, tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("import an_sdk_that_is_not_installed\n")
     for driver, line in (
-        (f"{own}:Refuses", "camera Refuses: opening failed: OSError: no licence"),
+        (f"{own}:Refuses", ":Refuses': opening failed: OSError: no licence"),
         (f"{own}:Panel", "wall: it has no 'expose'; expected expose"),
         (f"{tmp_path}/bad.py:Mine", "cannot be imported: ModuleNotFoundError: No module named 'an_sdk"),
         (f"{tmp_path}/none.py:Mine", "cannot be imported: FileNotFoundError"),
