@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.errors import LostDeviceError
 from ..imaging.warp import Array
 from .counts import step as step_of
 from .dark import Dark
@@ -43,8 +44,6 @@ def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged
     took = 0.0
     for _ in range(count):
         frame, real = exposed(camera, seconds, plane)
-        if total.ndim and total.shape != frame.shape:
-            raise DeviceError(f"{camera.name}: a frame of {frame.shape} follows one of {total.shape}")
         total, saturated, took = total + frame, saturated | (frame >= camera.white), took + real
     return Averaged(total / count, saturated, took / count)
 
@@ -57,8 +56,6 @@ def late(take: Callable[[int], Array]) -> tuple[int | None, list[Array]]:
     kind, so that what waits in the camera from before is none of them.
     """
     frames = [take(kind) for kind in [0] * WAITING + ORDER][WAITING:]
-    if len(shapes := sorted({frame.shape for frame in frames})) > 1:
-        raise DeviceError(f"frames differ in size: {shapes}")
     noise = float(np.median([_apart(*pair) for pair in pairwise(frames)]))
     first, other = frames[0], max(frames, key=lambda frame: _apart(frame, frames[0]))
     if not _apart(first, other) > 3 * noise:
@@ -76,7 +73,7 @@ def refuse_late(camera: Camera, plane: int) -> None:
     shortest, longest = camera.exposures
     for seconds in np.geomspace(shortest, max(min(longest, LIT), shortest), 4)[1:]:
         times = (shortest, float(seconds))
-        count, frames = late(lambda kind, times=times: exposed(camera, times[kind], plane)[0].astype(np.float32))  # type: ignore[misc]
+        count, frames = late(lambda kind, times=times: averaged(camera, times[kind], 1, plane).counts)  # type: ignore[misc]
         if count:
             which = f"frame {count + 1}" if count <= WAITING else f"none of {WAITING + 1} frames"
             raise DeviceError(
@@ -137,18 +134,21 @@ class FreshCamera:
         self._before: Counts | None = None
         self._latest: Counts | None = None
 
-    def changed(self, shown: object) -> None:
-        """The panel and the laser are about to show ``shown``, which may be what they showed before."""
+    def changed(self, shown: object, plane: int = 0) -> None:
+        """The panel and the laser are about to show ``shown``, which may be what they showed before, in a plane."""
+        self._plane = plane
         if shown != self._shown:
             self._shown, self._before = shown, self._latest
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
-        """As the camera's own; DeviceError for an old frame."""
+        """As the camera's own; DeviceError for an old frame, LostDeviceError where all are late from now on."""
         frame, real = self.camera.expose(seconds)
-        if self._latest is not None and frame.shape != self._latest.shape:
-            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._latest.shape}")
         self._latest = frame.copy()  # a driver may fill the same buffer again
         if self._before is not None and np.array_equal(frame, self._before) and not _dark(frame):
+            try:
+                refuse_late(self.camera, self._plane)
+            except DeviceError as error:
+                raise LostDeviceError(f"{error}; mend it, and run again with --retry-failed") from error
             raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
         return frame, real
 

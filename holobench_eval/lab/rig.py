@@ -195,16 +195,13 @@ class Rig:
             frames.append(light)
             lost.append(saturated)
             seconds.append(max(each.seconds for each in bracket))
-        shapes = {frame.shape for frame in frames}
-        if len(shapes) > 1:
-            raise DeviceError(f"{self.camera.name}: the channels' frames differ in size: {sorted(shapes)}")
         stacked = torch.from_numpy(np.stack(frames).astype(np.float32))
         return Photograph(stacked, float(np.mean(lost)), tuple(seconds))
 
     def _show(self, phase: Tensor, channel: int, convention: Convention, settle: float) -> None:
         self.laser.select(channel)
         levels = convention.of(channel).levels(phase[..., channel, :, :])
-        self._fresh.changed((channel, levels.tobytes()))
+        self._fresh.changed((channel, levels.tobytes()), self.planes[channel])
         if phase.ndim == 3:
             self.slm.show(levels)
         elif isinstance(self.slm, SequenceSlm):

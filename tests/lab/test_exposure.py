@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holobench_eval.core.errors import UserError
+from holobench_eval.core.errors import LostDeviceError, UserError
 from holobench_eval.imaging.convention import Convention
 from holobench_eval.lab.bench_file import CaptureSettings
 from holobench_eval.lab.dark import Dark, given_dark
@@ -66,8 +66,8 @@ def test_auto_exposure_says_why_there_is_none(light, settings, line):
 
 def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_twice_is_not():
     frames = iter(np.array(row, np.uint8)[None] for row in 4 * [[1, 2]] + [[3, 2]] + 2 * [[0, 0]])
-    device = SimulatedCamera(Still(np.ones((1, 2))))
-    device.expose = lambda seconds: (next(frames), seconds)
+    device = SimulatedCamera(Still(np.ones((1, 2))), exposures=(1e-5, 0.5))
+    device.expose = lambda seconds: (next(frames) if seconds == 1 else np.zeros((1, 2), np.uint8), seconds)
     camera = FreshCamera(device)
     camera.changed("first")
     camera.expose(1.0)
@@ -81,9 +81,17 @@ def test_a_frame_from_before_the_panel_changed_is_refused_and_the_same_picture_t
     camera.expose(1.0)
     camera.changed("third")  # black
     assert camera.expose(1.0)[0].max() == 0
-    device.expose = lambda seconds: (np.zeros((2, 1), np.uint8), seconds)
-    with pytest.raises(DeviceError, match=r"a frame of \(2, 1\) follows one of \(1, 2\)"):
-        camera.expose(1.0)
+
+
+def test_a_camera_that_falls_behind_ends_the_run_since_its_later_frames_are_old_too():
+    device, waiting = camera(noise=2.0), []
+    taken, device.expose = device.expose, lambda seconds: (waiting.append(taken(seconds)), waiting.pop(0))[1]
+    camera_ = FreshCamera(device)
+    camera_.changed("first")
+    waiting.append(camera_.expose(0.01))
+    camera_.changed("second")
+    with pytest.raises(LostDeviceError, match="frame 2 after an exposure was set is the first with it"):
+        camera_.expose(0.01)
 
 
 def test_a_driver_may_fill_one_buffer_again_and_a_dark_frame_may_repeat_with_its_hot_pixel():

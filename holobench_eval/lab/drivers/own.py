@@ -12,7 +12,7 @@ from ...core.errors import UserError
 from ...core.plugins import fields_of
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .driver import Driver, Kind, check_counts, check_levels, load
+from .driver import Driver, Kind, load
 from .worker import Worker, closed_on_failure
 
 OPENING, SHOWING, READING = 120.0, 20.0, 20.0  # seconds; some SDKs upload a look-up table first
@@ -53,6 +53,7 @@ class Own:
                 what = f"{key} is {getattr(device, key)!r}" if hasattr(device, key) else f"it has no '{key}'"
                 raise UserError(f"{name}: {what}; expected {right}")
         self._device, self._worker = device, worker or Worker(name)
+        self._size: tuple[int, ...] = ()  # of the first frame
         self.name, self._worker.idle = name, getattr(device, "idle", None)
         self._worker.name = name
         if kind == "slm":
@@ -77,7 +78,16 @@ class Own:
             types = [type(each).__name__ for each in given] if isinstance(given, tuple) else [type(given).__name__]
             what = f"expose returned {', '.join(types)}; expected (counts, seconds)"
             raise DeviceError(f"{self.name}: {what}") from None
-        check_counts(self.name, frame, self.white, "; set white, or shift the counts down")
+        planes = frame.ndim == 2 or (frame.ndim == 3 and frame.shape[2] == 3)
+        if frame.dtype not in (np.uint8, np.uint16) or not planes or not frame.size:
+            right = "whole counts, uint8 or uint16 of (H, W) or (H, W, 3)"
+            raise DeviceError(f"{self.name} gave {frame.dtype} of {frame.shape}; expected {right}")
+        if frame.shape != (self._size or frame.shape):
+            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._size}")
+        self._size = frame.shape
+        if frame.max() > self.white:
+            what = f"{frame.max()} counts, but {self.white:.0f} are its white; set white, or shift the counts down"
+            raise DeviceError(f"{self.name} gave {what}")
         return frame, real
 
     def close(self) -> None:
@@ -86,7 +96,9 @@ class Own:
 
     def _show(self, function: Callable[[list[Levels]], Any], *frames: Levels) -> None:
         for frame in frames:
-            check_levels(self.name, self.shape, frame)
+            if frame.dtype != np.uint8 or frame.shape != self.shape:  # nothing is converted
+                given = f"{frame.dtype} of {frame.shape}"
+                raise DeviceError(f"{self.name} takes uint8 levels of {self.shape}, not {given}")
         copies = [frame.copy() for frame in frames]  # a device may keep what it is given
         self._worker.call("showing a picture", SHOWING, lambda: function(copies))
 
