@@ -79,24 +79,22 @@ class Rig:
         if ready is None:
             raise UserError("the bench takes no photographs before it has been prepared and has passed its gates")
         self._check_phase(request.phase)
-        try:
-            taken = _patiently(lambda: self._take(request, self.convention, ready, self.settings))
-        except DeviceError as error:
-            self._failures += 1
-            if self._failures >= 2 or not self._answers():
-                raise LostDeviceError(
-                    f"the bench does not answer any more: {error}; mend it, and run again with --retry-failed"
-                ) from error
-            raise CellError(f"no photograph: {error}") from error
-        self._failures = 0
-        return taken
-
-    def _answers(self) -> bool:
-        """Whether the camera still gives a frame."""
+        for _ in range(TRIES):
+            try:
+                taken = self._take(request, self.convention, ready, self.settings)
+            except DeviceError as error:
+                fault = str(error)
+            else:
+                self._failures = 0
+                return taken
+        self._failures += 1
         with suppress(DeviceError):
-            self.camera.expose(self.camera.exposures[0])
-            return True
-        return False
+            self.camera.expose(self.camera.exposures[0])  # whether it still gives a frame
+            if self._failures < 2:
+                raise CellError(f"no photograph: {fault}")
+        raise LostDeviceError(
+            f"the bench does not answer any more: {fault}; mend it, and run again with --retry-failed"
+        )
 
     def prepare(self, pattern: Request, say: Callable[[str], None]) -> Prepared:
         """Exposure, settling time, dark frames, linearity, phase convention, in this order, one line each.
@@ -216,10 +214,3 @@ class Rig:
             raise CellError(f"phase is {tuple(phase.shape)}, but {self.slm.name} with its wavelengths shows {wanted}")
         if not phase.is_floating_point() or not bool(torch.isfinite(phase).all()):
             raise CellError("phase holds values that are no finite real numbers; the panel cannot show it")
-
-
-def _patiently(take: Callable[[], Photograph]) -> Photograph:
-    for _ in range(TRIES - 1):
-        with suppress(DeviceError):
-            return take()
-    return take()

@@ -41,8 +41,8 @@ class Own:
     exposures: tuple[float, float]
     show_sequence: Callable[[Any], None]
 
-    def __init__(self, kind: Kind, device: Any, worker: Worker | None = None) -> None:
-        """device: open, and closed with this; worker: the thread that opened it. UserError: it lacks something."""
+    def __init__(self, kind: Kind, device: Any, worker: Worker) -> None:
+        """device: open, and closed with this; worker: the thread it lives on. UserError: it lacks something."""
         name = str(getattr(device, "name", "") or f"{kind} {type(device).__name__}")
         for key, right in NEEDS[kind].items():
             try:
@@ -52,7 +52,7 @@ class Own:
             if not good:
                 what = f"{key} is {getattr(device, key)!r}" if hasattr(device, key) else f"it has no '{key}'"
                 raise UserError(f"{name}: {what}; expected {right}")
-        self._device, self._worker = device, worker or Worker(name)
+        self._device, self._worker = device, worker
         self._size: tuple[int, ...] = ()  # of the first frame
         self.name, self._worker.idle = name, getattr(device, "idle", None)
         self._worker.name = name
@@ -114,8 +114,8 @@ def own_driver(kind: Kind, name: str) -> Driver:
     return Driver(kind, name, settings, lambda params: cls(**vars(params)), "", "", list)
 
 
-def opened(driver: Driver, settings: Any) -> Own:
-    """The device of a driver, on a thread of its own. UserError and DeviceError as of `Own`."""
-    worker = Worker(f"{driver.kind} driver '{driver.name}'")
+def opened(kind: Kind, name: str, make: Callable[[], Any]) -> Own:
+    """A device that ``make`` gives, on a thread of its own. UserError: it lacks something. DeviceError: it fails."""
+    worker = Worker(name)
     with closed_on_failure(lambda: worker.stop(0, lambda: None)):
-        return worker.call("opening", OPENING, lambda: Own(driver.kind, driver.opens(settings), worker))
+        return worker.call("opening", OPENING, lambda: Own(kind, make(), worker))

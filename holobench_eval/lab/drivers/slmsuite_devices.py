@@ -122,11 +122,8 @@ def _find(kind: Hardware, device: str) -> Any:
 
 
 def theirs(kind: Kind, device: Any) -> SlmsuiteSlm | SlmsuiteCamera:
-    """An open device with slmsuite's interface. UserError for another one."""
-    try:
-        return SlmsuiteSlm(device) if kind == "slm" else SlmsuiteCamera(device)
-    except AttributeError as error:
-        raise UserError(f"{kind} without the interface of slmsuite's: {error}") from error
+    """An open device with slmsuite's interface. AttributeError for another one."""
+    return SlmsuiteSlm(device) if kind == "slm" else SlmsuiteCamera(device)
 
 
 def _driver(kind: Kind, hardware: Hardware, words: str, example: str) -> Driver:

@@ -157,6 +157,20 @@ def test_what_a_camera_lacks_is_said_with_what_would_be_right(key: str, value: A
         adopted("camera", camera)
 
 
+def test_a_class_and_an_object_that_fails_are_no_open_devices() -> None:
+    class Unplugged:
+        @property
+        def name(self) -> str:
+            raise OSError("unplugged")
+
+    for device, line in (
+        (Whole, "camera is the class Whole; expected an open device of it"),
+        (Unplugged(), "camera: opening failed: OSError: unplugged"),
+    ):
+        with pytest.raises(UserError, match=line):
+            adopted("camera", device)
+
+
 @pytest.mark.parametrize(
     ("given", "line"),
     [
@@ -213,6 +227,6 @@ def test_a_class_with_slmsuites_interface_is_taken_from_a_module_a_file_and_as_a
         assert (int(frame.max()), seconds) == (500, 0.5)
         camera.close()
     with pytest.raises(
-        UserError, match="camera without the interface of slmsuite's: 'Less' object has no attribute 'close'"
+        DeviceError, match="'slmsuite': opening failed: AttributeError: 'Less' object has no attribute 'close'"
     ):
         open_device("camera", "slmsuite", {"device": f"{tmp_path}/theirs.py:Less"})
