@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import field, fields, is_dataclass, make_dataclass, replace
+from dataclasses import MISSING, field, fields, is_dataclass, make_dataclass, replace
 from functools import cache, lru_cache, wraps
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -176,9 +176,9 @@ def fields_of(function: Callable[..., Any], owner: str, skipped: int = 0) -> lis
             raise UserError(f"{owner}: parameter '{given.name}' needs an annotation or a default")
     own: Any = vars(function).get("__init__", function) if isinstance(function, type) else function
     hints = get_type_hints(own, include_extras=True)
-    defaults = [field() if each.default is each.empty else field(default=each.default) for each in further]
+    defaults = [MISSING if each.default is each.empty else each.default for each in further]
     return [
-        (each.name, hints.get(each.name, type(each.default)), default)
+        (each.name, hints.get(each.name, type(each.default)), field(default=default))
         for each, default in zip(further, defaults, strict=True)
     ]
 

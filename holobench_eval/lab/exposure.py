@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.errors import LostDeviceError
 from ..imaging.warp import Array
 from .counts import step as step_of
 from .dark import Dark
@@ -20,7 +21,9 @@ ACCEPTED = 0.6, 1.25  # of FILL: wide enough for shutters that know only full st
 DIMMEST = 0.1  # of the range; less is refused, since the counts are too coarse
 TRIES = 16
 STRONGEST_STEP = 32.0
-ORDER = [0, 0, 1, 1, 1, 0, 0, 0]  # of two kinds of picture
+ORDER = [0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0]  # of two kinds of picture
+WAITING = 6  # frames that may be there from before
+FAR = 8.0  # times an exposure: bright samples are saturated
 LIT = 1.0  # seconds that show any picture
 SHALLOWEST = 15  # counts of a picture that tell how deep they are
 FEW = 0.01  # of the samples, which may be hot pixels where no more are at full scale
@@ -42,26 +45,24 @@ def averaged(camera: Camera, seconds: float, count: int, plane: int) -> Averaged
     took = 0.0
     for _ in range(count):
         frame, real = exposed(camera, seconds, plane)
-        if total.ndim and total.shape != frame.shape:
-            raise DeviceError(f"{camera.name}: a frame of {frame.shape} follows one of {total.shape}")
         total, saturated, took = total + frame, saturated | (frame >= camera.white), took + real
     return Averaged(total / count, saturated, took / count)
 
 
-def late(take: Callable[[int], Array]) -> int | None:
-    """How many frames late a camera is, None where two kinds of picture look alike; take: the next frame, of a kind.
+def late(take: Callable[[int], Array]) -> tuple[int | None, list[Array]]:
+    """How many frames late a camera is, None where two kinds of picture look alike; and the pictures, as in ``ORDER``.
+    More than ``WAITING`` where that is not known.
 
-    The two kinds are taken in an order that no shift repeats.
+    take: the next frame, of a kind. The two kinds are taken in an order that no shift repeats, after some of the first
+    kind, so that what waits in the camera from before is none of them.
     """
-    frames = [take(kind) for kind in ORDER]
-    if len(shapes := sorted({frame.shape for frame in frames})) > 1:
-        raise DeviceError(f"frames differ in size: {shapes}")
+    frames = [take(kind) for kind in [0] * WAITING + ORDER][WAITING:]
     noise = float(np.median([_apart(*pair) for pair in pairwise(frames)]))
     first, other = frames[0], max(frames, key=lambda frame: _apart(frame, frames[0]))
     if not _apart(first, other) > 3 * noise:
-        return None
+        return None, frames
     seen = [int(_apart(frame, other) < _apart(frame, first)) for frame in frames]
-    return next(count for count in range(len(ORDER) + 1) if seen[count:] == ORDER[: len(ORDER) - count])
+    return next(n for n in range(len(ORDER) + 1) if seen[n:] == ORDER[: len(ORDER) - n]), frames
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -72,17 +73,13 @@ def refuse_late(camera: Camera, plane: int) -> None:
     """DeviceError for a camera whose first frame after a change of the exposure is from before it, in steady light."""
     shortest, longest = camera.exposures
     for seconds in np.geomspace(shortest, max(min(longest, LIT), shortest), 4)[1:]:
-        frames: list[Array] = []
-
-        def take(kind: int, frames: list[Array] = frames, times: Sequence[float] = (shortest, seconds)) -> Array:
-            frames.append(exposed(camera, times[kind], plane)[0].astype(np.float32))
-            return frames[-1]
-
-        count = late(take)
+        times = (shortest, float(seconds))
+        count, frames = late(lambda kind, times=times: averaged(camera, times[kind], 1, plane).counts)  # type: ignore[misc]
         if count:
-            remedy = "empty its queue of frames before each, or trigger each"
+            which = f"frame {count + 1}" if count <= WAITING else f"none of {WAITING + 1} frames"
             raise DeviceError(
-                f"{camera.name}: frame {count + 1} after an exposure was set is the first with it; {remedy}"
+                f"{camera.name}: {which} after an exposure was set is the first with it; empty its queue of frames "
+                "before each, or trigger each"
             )
         if count == 0:
             return
@@ -93,14 +90,21 @@ def refuse_late(camera: Camera, plane: int) -> None:
             )
 
 
-def miscounted(frame: Counts, white: float) -> str:
-    """What is wrong with a camera whose counts end below its white, "" where nothing is seen of that."""
-    top, low = int(frame.max()), int(np.percentile(frame, 1))
-    share, below = np.mean(frame == top), np.mean((frame < top) & (frame >= top - max(0.05 * (top - low), 1)))
-    if not SHALLOWEST < top < white or _dark(frame) or share <= max(MOST_SATURATED, 2 * below):
-        return ""
-    shifted = f" (all are multiples of {unit})" if (unit := step_of(frame)) > 1 else ""
-    return f"its counts end at {top}{shifted}, below its white of {white:g}; set its white to that, or its bits"
+def refuse_miscounted(camera: Camera, seconds: float, plane: int) -> Counts:
+    """A picture ``(Hs, Ws)`` of many times an exposure that fills the range, so that bright samples are saturated.
+
+    DeviceError where these have fewer counts than the camera's white.
+    """
+    short, far = (exposed(camera, each, plane)[0] for each in (0.0, FAR * seconds))
+    top, low, unit = int(far.max()), int(np.percentile(far, 1)), step_of(far)
+    share, below = np.mean(far == top), np.mean((far < top) & (far >= top - max(0.05 * (top - low), 1)))
+    if top - np.percentile(short, 99) > SHALLOWEST and top < camera.white and share > max(MOST_SATURATED, 2 * below):
+        shifted = f" (all are multiples of {unit})" if unit > 1 else ""
+        raise DeviceError(
+            f"{camera.name}: its counts end at {top}{shifted}, below its white of {camera.white:g}; set its white to "
+            "that, or its bits"
+        )
+    return far
 
 
 def exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
@@ -109,9 +113,10 @@ def exposed(camera: Camera, seconds: float, plane: int) -> tuple[Counts, float]:
     frame, real = camera.expose(min(max(seconds, shortest), longest))
     if frame.ndim == 3:
         frame = frame[..., plane]
-    if frame.ndim != 2 or not frame.size or not np.isfinite(real) or real <= 0:
+    if frame.ndim != 2 or not frame.size or not shortest / 2 <= real <= 2 * longest:
         raise DeviceError(
-            f"{camera.name}: a frame of shape {frame.shape} that was exposed for {real} s is no photograph"
+            f"{camera.name}: a frame of shape {frame.shape} that was exposed for {real:g} s is no photograph; its "
+            f"exposures are {shortest:g} to {longest:g} s"
         )
     return frame, real
 
@@ -130,18 +135,21 @@ class FreshCamera:
         self._before: Counts | None = None
         self._latest: Counts | None = None
 
-    def changed(self, shown: object) -> None:
-        """The panel and the laser are about to show ``shown``, which may be what they showed before."""
+    def changed(self, shown: object, plane: int = 0) -> None:
+        """The panel and the laser are about to show ``shown``, which may be what they showed before, in a plane."""
+        self._plane = plane
         if shown != self._shown:
             self._shown, self._before = shown, self._latest
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
-        """As the camera's own; DeviceError for an old frame."""
+        """As the camera's own; DeviceError for an old frame, LostDeviceError where all are late from now on."""
         frame, real = self.camera.expose(seconds)
-        if self._latest is not None and frame.shape != self._latest.shape:
-            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._latest.shape}")
         self._latest = frame.copy()  # a driver may fill the same buffer again
         if self._before is not None and np.array_equal(frame, self._before) and not _dark(frame):
+            try:
+                refuse_late(self.camera, self._plane)
+            except DeviceError as error:
+                raise LostDeviceError(f"{error}; mend it, and run again with --retry-failed") from error
             raise DeviceError(f"{self.name}: gave the frame from before the panel changed")
         return frame, real
 
@@ -158,14 +166,13 @@ def auto_exposure(camera: Camera, plane: int) -> float:
     DeviceError, in one line, where no exposure of the camera does that.
     """
     shortest, longest = camera.exposures
-    seconds = float(np.sqrt(shortest * longest))
+    seconds, real = float(np.sqrt(shortest * longest)), 0.0
     for _ in range(TRIES):
+        before = real
         frame, real = exposed(camera, seconds, plane)
         # dark level and background; where it is not dark at all, the steps are only less exact
         dark, bright = np.percentile(frame, (1, PERCENTILE))
         fill, full = float((bright - dark) / max(camera.white - dark, 1)), float(np.mean(frame >= camera.white))
-        if fault := miscounted(frame, camera.white):
-            raise DeviceError(f"{camera.name}: {fault}")
         if bright >= camera.white:
             step = 1 / STRONGEST_STEP if full > 0.1 else 0.25
         else:
@@ -181,10 +188,13 @@ def auto_exposure(camera: Camera, plane: int) -> float:
         if step > 1 and seconds >= longest:
             if fill >= DIMMEST:
                 return real
+            refuse_miscounted(camera, longest, plane)
             raise DeviceError(
                 f"{camera.name}: too little light at its longest exposure of {longest:.2g} s, {fill:.1%} of its range; "
                 "is the laser on, the iris open, the lens cap off?"
             )
+        if real == before:  # a shutter that knows only some times
+            step *= step
         seconds = min(max(real * step, shortest), longest)
     raise DeviceError(
         f"{camera.name}: no exposure is right after {TRIES} tries; is the light unsteady, or the exposure ignored?"

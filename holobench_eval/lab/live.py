@@ -49,11 +49,10 @@ def letter(bench: RealBench) -> Request:
 
 
 def _devices(bench: BenchFile, slm: Slm | None, camera: Camera | None) -> tuple[Slm, Camera]:
-    panel, sensor = slm or _driver("slm", bench.slm), camera or _driver("camera", bench.camera)
-    if isinstance(sensor, tuple):
-        checked_params("camera", *sensor)  # before a panel is opened for nothing
+    if camera is None:
+        checked_params("camera", *_driver("camera", bench.camera))  # before a panel is opened for nothing
     try:
-        slm = open_device("slm", *panel) if isinstance(panel, tuple) else panel
+        slm = slm or open_device("slm", *_driver("slm", bench.slm))
         with closed_on_failure(slm.close):
             if slm.shape != bench.panel.shape:
                 shape = list(bench.panel.shape)
@@ -63,7 +62,7 @@ def _devices(bench: BenchFile, slm: Slm | None, camera: Camera | None) -> tuple[
                     f"panel.frames is {bench.panel.frames}, but {slm.name} shows one pattern an exposure; "
                     "leave it out, give the driver show_sequence, or exchange files (holoeval session)"
                 )
-            return slm, open_device("camera", *sensor) if isinstance(sensor, tuple) else sensor
+            return slm, camera or open_device("camera", *_driver("camera", bench.camera))
     except DeviceError as error:
         raise UserError(f"bench '{bench.name}': {error}") from error
 

@@ -9,14 +9,13 @@ import numpy as np
 
 from ..imaging.warp import Array
 from .devices import DeviceError
-from .exposure import late
+from .exposure import ORDER, WAITING, late
 
 STEPS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.0)  # waiting times that are tried [s]
 PATIENCE = 1.5  # seconds after which everything must have settled
 TOLERANCE = 0.02  # of the change between the two patterns
 UNSTEADY = 0.1  # of the change: more from frame to frame, and nothing can be measured
 MARGIN = 1.5  # of the measured time
-REPEATS = 3
 FAINTEST = 0.05  # of the brighter picture: a smaller change between the two is none
 BLIND = "the picture does not change with the hologram; is this the panel that the camera sees?"
 BRIGHT = 0.9  # quantile: samples that change most tell
@@ -43,8 +42,11 @@ class Toggle:
         return self.take()
 
 
-def refuse_old(toggle: Toggle, seconds: float) -> None:
-    """DeviceError for a camera whose first picture, so long after a hologram was shown, is of the one before it."""
+def refuse_old(toggle: Toggle, seconds: float) -> tuple[list[Array], list[Array]]:
+    """Pictures of the bright and of the dark pattern, so long after they were shown.
+
+    DeviceError for a camera whose first one is of the pattern before.
+    """
     shown: list[int] = []
 
     def take(kind: int) -> Array:
@@ -54,13 +56,21 @@ def refuse_old(toggle: Toggle, seconds: float) -> None:
         shown.append(kind)
         return toggle.take()
 
-    if (count := late(take)) is None:
+    count, pictures = late(take)
+    if count is None:
         raise DeviceError(BLIND)
+    if count > WAITING:
+        raise DeviceError(
+            f"pictures {seconds:g} s after holograms were shown do not follow them; does the panel show the one "
+            "before, settle slowly or flicker, or the laser's power change?"
+        )
     if count:
         raise DeviceError(
             f"frame {count + 1} after {seconds:g} s to settle is the first of a hologram; empty the camera's queue "
             "of frames, trigger each, or let the panel settle for longer"
         )
+    bright, dark = ([each for each, kind in zip(pictures, ORDER, strict=True) if kind == wanted] for wanted in (0, 1))
+    return bright, dark
 
 
 def settle_time(toggle: Toggle) -> float:
@@ -89,12 +99,7 @@ def settle_time(toggle: Toggle) -> float:
 
 def _settled(toggle: Toggle) -> tuple[Callable[[Array], float], float]:
     """How to read the level of a picture, and how much it varies (rms) when all has settled."""
-    bright, dark = ([toggle.after(kind, PATIENCE)] for kind in (True, False))
-    for pictures, kind in ((dark, False), (bright, True)):
-        toggle.show(kind)
-        for _ in range(REPEATS - 1):
-            toggle.wait(PATIENCE)
-            pictures.append(toggle.take())
+    bright, dark = refuse_old(toggle, PATIENCE)
     change = np.abs(bright[0] - dark[0])
     telling = change >= np.quantile(change, BRIGHT)
     base = float(max(np.mean(each[telling]) for each in (bright[0], dark[0])))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 import torch
@@ -16,29 +15,22 @@ from ..display.simulated.stages.relay import sample
 PANEL, GREEN = (128, 128), 1  # rows and columns; the laser that is on, of the profile's
 GAIN, BLACK, NOISE = 5.0, 0.016, 0.0005  # of full scale: for a second of the panel's mean light; without light; rms
 
-_shown = [np.zeros(PANEL, np.uint8)]
+_bench = SimulatedBench(load_profile("leto-mild").scaled(PANEL))
 _random = np.random.default_rng(0)
+_light = [np.zeros(())]  # on the sensor
 
 
 def write(levels: NDArray[np.uint8]) -> None:
     """Show levels ``PANEL`` on the panel."""
-    _shown[0] = levels.copy()
+    phase = torch.from_numpy(levels * np.float32(math.tau / 256))
+    _light[0] = sample(_bench.integrated(phase, GREEN), _bench.grid, _bench.image_samples).double().numpy()
 
 
 def grab(seconds: float, bits: int) -> NDArray[np.uint16]:
     """A frame ``(H, W)`` of counts up to ``2**bits - 1``, exposed for so long."""
-    share = _light(_shown[0].tobytes()) * GAIN * seconds + BLACK
+    share = _light[0] * GAIN * seconds + BLACK
     noisy = np.clip(share + _random.normal(0, NOISE, share.shape), 0, 1)
     return np.round(noisy * (2**bits - 1)).astype(np.uint16)
 
 
-@lru_cache(maxsize=1)
-def _bench() -> SimulatedBench:
-    return SimulatedBench(load_profile("leto-mild").scaled(PANEL))
-
-
-@lru_cache(maxsize=8)
-def _light(levels: bytes) -> NDArray[np.float64]:
-    phase = torch.from_numpy(np.frombuffer(levels, np.uint8).reshape(PANEL) * np.float32(math.tau / 256))
-    bench = _bench()
-    return sample(bench.integrated(phase, GREEN), bench.grid, bench.image_samples).double().numpy()
+write(np.zeros(PANEL, np.uint8))  # slow the first time, when a panel would seem to hang

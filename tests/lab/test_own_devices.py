@@ -64,7 +64,7 @@ def study(folder: Path) -> tuple[str, str]:
     [
         (unplugged, "simulated camera: taking a picture failed: OSError: no such device"),
         (lambda frames: frames[-1][None], "gave uint16 of (1, 201, 201); expected whole counts"),
-        (lambda frames: frames[-1][: 200 + len(frames) % 2], "frames differ in size: [(200, 201), (201, 201)]"),
+        (lambda frames: frames[-1][: 200 + len(frames) % 2], "201) follows one of (20"),
         (lambda frames: frames[-1].astype(float), "gave float64 of (201, 201)"),
         (lambda _: None, "gave object of ()"),
         (lambda frames: frames[-1] * 16, "counts, but 4095 are its white"),

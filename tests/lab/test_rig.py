@@ -268,7 +268,7 @@ def test_a_function_of_a_file_gets_the_channel_or_none_and_what_it_raises_is_a_d
         (LaserSettings(command=("laser", "on")), 3, "must hold {channel}"),
         (LaserSettings(callable="laser"), 3, "should be path/to/file.py:Name"),
         (LaserSettings(callable="none.py:switch"), 3, "cannot be imported"),
-        (LaserSettings(callable="math:switch"), 3, "no 'switch' in math"),
+        (LaserSettings(callable="math:switch"), 3, "'switch' of math is not there"),
     ],
 )
 def test_settings_that_cannot_work_are_one_line(tmp_path, settings, channels, line):

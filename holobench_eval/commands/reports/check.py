@@ -34,7 +34,10 @@ def check(
     seed: Annotated[int, typer.Option(help="Which kept captures and which cells for --rerun are drawn.")] = 0,
     artifacts: Learned = Path("artifacts"),
 ) -> None:
-    """Check that reports still follow from their records and kept captures; with --rerun, also from their methods."""
+    """Check that reports still follow from their records.
+
+    Kept captures are scored again; with --rerun, methods solve again, too.
+    """
     reports, problems = problems_in(folder)
     problems += kept_in(folder, seed)
     if rerun_cells:

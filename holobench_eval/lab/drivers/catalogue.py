@@ -12,7 +12,7 @@ from ...core.installed import installed, installing
 from ...core.plugins import made
 from ..devices import DeviceError
 from .driver import Driver, Kind
-from .own import Own, own_driver
+from .own import Own, opened, own_driver
 from .slmsuite_devices import theirs
 from .worker import line
 
@@ -44,14 +44,14 @@ class Survey:
     why: str
 
 
-def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
+def open_device(kind: Kind, driver: str, params: Mapping[str, Any]) -> Own:
     """The `Slm` or the `Camera` that ``driver`` opens with ``params``.
 
     UserError, in one line: an unknown driver or parameter, a wrong value, a package that is missing, no such device.
     DeviceError: it is there, but does not answer.
     """
     settings = checked_params(kind, driver, params)
-    return _driver(kind, driver).opens(settings)
+    return opened(kind, f"{kind} driver '{driver}'", lambda: _driver(kind, driver).opens(settings))
 
 
 def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
@@ -60,10 +60,15 @@ def checked_params(kind: Kind, driver: str, params: Mapping[str, Any]) -> Any:
 
 
 def adopted(kind: Kind, device: Any) -> Own:
-    """An open device of a user's, or of slmsuite's. UserError: it lacks something."""
+    """An open device of a user's, or of slmsuite's. UserError: it lacks something, or fails."""
+    if isinstance(device, type):
+        raise UserError(f"{kind} is the class {device.__name__}; expected an open device of it")
     call, interface = ("show", "set_phase") if kind == "slm" else ("expose", "get_image")
     is_theirs = hasattr(device, interface) and not hasattr(device, call)
-    return Own(kind, theirs(kind, device) if is_theirs else device)
+    try:
+        return opened(kind, kind, lambda: theirs(kind, device) if is_theirs else device)
+    except DeviceError as error:
+        raise UserError(str(error)) from error
 
 
 def _driver(kind: Kind, name: str) -> Driver:

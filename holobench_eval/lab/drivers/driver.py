@@ -1,4 +1,4 @@
-"""What all drivers share: their entry in the catalogue, the package they need, the checks of levels and counts."""
+"""What all drivers share: their entry in the catalogue, and the package they need."""
 
 from __future__ import annotations
 
@@ -10,15 +10,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, TypeVar
 
-import numpy as np
-
 from ...core.errors import UserError, suggest
 from ...core.hashing import State, file_state
 from ...core.installed import installing
 from ...core.plugins import is_file
 from ...core.sources import import_file
-from ...imaging.convention import Levels
-from ..devices import Counts, DeviceError
 from .worker import line
 
 T = TypeVar("T")
@@ -29,9 +25,10 @@ Kind = Literal["slm", "camera"]
 class Driver:
     """How devices of one kind are opened; every module that `catalogue` names lists its own as ``DRIVERS``.
 
-    name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it;
-    package: the distribution that it needs; extra: of this project, that installs it ("" for none); answering: lists
-    what answers, in words; unlisted: what to do where the package cannot look for devices by itself.
+    name: as a bench file gives it; settings: dataclass of its parameters; opens: the device for an instance of it,
+    called on a thread of the device's own; package: the distribution that it needs; extra: of this project, that
+    installs it ("" for none); answering: lists what answers, in words; unlisted: what to do where the package cannot
+    look for devices by itself.
     """
 
     kind: Kind
@@ -60,7 +57,9 @@ def load(name: str, what: str) -> Any:
     found = getattr(module, attribute, None)
     if not callable(found):
         own = [key for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
-        raise UserError(f"{what} '{name}': there is no '{attribute}' in {source}; {suggest(attribute, own)}")
+        own = [key for key in own if callable(getattr(module, key))]
+        fault = "no class or function" if hasattr(module, attribute) else "not there"
+        raise UserError(f"{what} '{name}': '{attribute}' of {source} is {fault}; {suggest(attribute, own)}")
     return found
 
 
@@ -89,23 +88,3 @@ def only(what: str, asked: str, fitting: Sequence[T], listed: Sequence[str]) -> 
         return fitting[0]
     number = f"{len(fitting)} {what}s" if fitting else f"no {what}"
     raise UserError(f"{number} '{asked}'; found: {', '.join(listed) or 'none; is it on, and not in use?'}")
-
-
-def check_levels(name: str, shape: tuple[int, int], levels: Levels) -> None:
-    """DeviceError unless ``levels`` are uint8 and as many as the panel ``name`` has pixels: nothing is converted."""
-    if levels.dtype != np.uint8 or levels.shape != shape:
-        raise DeviceError(f"{name} takes uint8 levels of {shape}, not {levels.dtype} of {levels.shape}")
-
-
-def check_counts(name: str, frame: Counts, white: float, hint: str = "") -> None:
-    """DeviceError unless a camera's frame has whole counts up to its white; hint: what to do where it goes beyond."""
-    if (
-        frame.dtype not in (np.uint8, np.uint16)
-        or frame.shape[2:] not in ((), (3,))
-        or frame.ndim < 2
-        or not frame.size
-    ):
-        right = "whole counts, uint8 or uint16 of (H, W) or (H, W, 3)"
-        raise DeviceError(f"{name} gave {frame.dtype} of {frame.shape}; expected {right}")
-    if frame.max() > white:
-        raise DeviceError(f"{name} gave {frame.max()} counts, but {white:.0f} are its white{hint}")

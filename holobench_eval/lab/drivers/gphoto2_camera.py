@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
+import numpy as np
+
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
 from ..raw import RawFrame, is_jpeg, read_raw
 from .driver import Driver, import_package, only
-from .worker import Worker, asked, closed_on_failure
+from .worker import asked, closed_on_failure
 
-OPENING = 60.0  # seconds, with a first picture
-CAPTURING = 30.0  # beyond the exposure, which long-exposure noise reduction may double
+LOOKING = 30.0  # seconds
 
 FORMATS = ("imageformat", "imagequality", "imgquality")  # Canon, Nikon and Sony, others
 FULL_RAW = re.compile(r"\b(raw|nef|dng|arw|orf|raf|pef|rw2)\b", re.IGNORECASE)
@@ -47,7 +48,7 @@ class Gphoto2Settings:
 
 
 class Gphoto2Camera:
-    """A DSLR as a `Camera`: ``(Hs, Ws, 3)`` uint16 at half the sensor's rows and columns (see ``read_raw``)."""
+    """A DSLR as a device that `Own` takes: ``(Hs, Ws, 3)`` uint16 at half the sensor's rows and columns."""
 
     def __init__(self, settings: Gphoto2Settings) -> None:
         """Opens it, sets RAW and a fixed exposure, and takes a first picture.
@@ -59,27 +60,23 @@ class Gphoto2Camera:
         self._settings = settings
         self._camera: Any = None
         self._gp = _gphoto2()
-        self._worker = Worker(self.name)
         with closed_on_failure(self.close):
-            self._worker.call("opening", OPENING, self._open)
+            self._open()
             first, _ = self._picture(nearest(self._shutter, 0.01))
         self.white = first.white
-
-    @property
-    def exposures(self) -> tuple[float, float]:
-        """Shortest and longest exposure [s] of the shutter by its clock; ``bulb`` is not used."""
-        return min(self._exact.values()), max(self._exact.values())
+        self.exposures = min(self._exact.values()), max(self._exact.values())  # by its clock; ``bulb`` is not used
 
     def expose(self, seconds: float) -> tuple[Counts, float]:
         """A picture at the shutter speed nearest to ``seconds``, as a ratio, and the time [s] of that speed."""
         frame, real = self._picture(min(self._exact, key=lambda time: abs(math.log(self._exact[time] / seconds))))
         if frame.white != self.white:
             raise DeviceError(f"{self.name}: the white level went from {self.white:.0f} to {frame.white:.0f}")
-        return frame.counts, real
+        return np.minimum(frame.counts, np.uint16(self.white)), real  # beyond it all are saturated
 
     def close(self) -> None:
         """Give the camera back to the desktop."""
-        self._worker.stop(CAPTURING, lambda: self._camera and self._camera.exit())
+        if self._camera:
+            self._camera.exit()
 
     def _open(self) -> None:
         gp, settings = self._gp, self._settings
@@ -100,7 +97,7 @@ class Gphoto2Camera:
         camera.init()
         self._camera = camera
         serial = self._value("serialnumber")
-        self.name = self._worker.name = f"{model} {serial}".strip()
+        self.name = f"{model} {serial}".strip()
 
         self._fix_exposure()
         if (config := next(filter(self._choices, FORMATS), None)) is not None:
@@ -122,7 +119,7 @@ class Gphoto2Camera:
         self._exact = exact(self._shutter)
 
     def _picture(self, shutter: float) -> tuple[RawFrame, float]:
-        data = self._worker.call("taking a picture", CAPTURING + 3 * shutter, lambda: self._take(shutter))
+        data = self._take(shutter)
         if is_jpeg(data):
             raise UserError(
                 f"{self.name} gave a JPEG, whose values are not linear in light; set its image quality to RAW alone"
@@ -176,7 +173,7 @@ class Gphoto2Camera:
 def list_cameras() -> list[str]:
     """``Canon EOS Rebel T6i at usb:001,004`` for every camera that answers; UserError without the package."""
     gp = _gphoto2()
-    answering = asked("libgphoto2", "looking for cameras", CAPTURING, lambda: _answering(gp))
+    answering = asked("libgphoto2", "looking for cameras", LOOKING, lambda: _answering(gp))
     return [f"{model} at {port}" for model, port in answering]
 
 

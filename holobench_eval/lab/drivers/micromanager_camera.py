@@ -13,7 +13,6 @@ from annotated_types import Interval, MinLen
 from ...core.errors import UserError, suggest
 from ..devices import Counts
 from .driver import Driver, import_package
-from .own import opened
 from .worker import closed_on_failure, line
 
 Seconds = Annotated[float, Interval(gt=0, le=3600)]
@@ -137,7 +136,7 @@ DRIVERS = (
         "camera",
         "micromanager",
         MicromanagerSettings,
-        lambda settings: opened("camera", "Micro-Manager", lambda: MicromanagerCamera(settings)),
+        MicromanagerCamera,
         "pymmcore-plus",
         "micromanager",
         lambda: list_installations() and [],

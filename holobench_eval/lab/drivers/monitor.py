@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ...core.errors import UserError
 from ...imaging.convention import Levels
 from ..devices import DeviceError
-from .driver import Driver, check_levels, only
+from .driver import Driver, only
 from .screen_check import gamma_is_straight, grab
 from .window import Window, screens
-from .worker import Worker, asked, closed_on_failure
+from .worker import asked, closed_on_failure
 
 SECONDS = 20.0  # a graphics driver that takes longer hangs
 GRABS = 20  # a desktop may take some frames until a new picture is on its screen
@@ -41,7 +41,7 @@ class MonitorSettings:
 
 
 class MonitorSlm:
-    """A monitor as an `Slm`: full screen, pixel to pixel, read back after every picture."""
+    """A monitor as a device that `Own` takes: full screen, pixel to pixel, read back after every picture."""
 
     def __init__(self, settings: MonitorSettings) -> None:
         """UserError: no such monitor, or several; no desktop, no OpenGL. DeviceError: the window is not as asked."""
@@ -52,9 +52,14 @@ class MonitorSlm:
         self.shape = rows, columns
         self.name = f"monitor {settings.name} {columns}x{rows}"
         self._window: Window | None = None
-        self._worker = Worker(self.name, idle=self._pump)
         with closed_on_failure(self.close):
-            self._worker.call("opening its window", SECONDS, self._open)
+            self._screen = matching(screens(), self._settings)
+            self._window = Window(self._screen)
+            if self._window.shape != self.shape:
+                rows, columns = self._window.shape
+                raise DeviceError(
+                    f"{self.name}: the window has {columns}x{rows} pixels; set this monitor's scaling to 100 %"
+                )
 
     def show(self, levels: Levels) -> None:
         """Show ``(H, W)`` uint8 levels and read them back; returns after the second refresh of the screen.
@@ -62,29 +67,7 @@ class MonitorSlm:
         DeviceError where a pixel of what was read back is another: scaling, colour management, dithering, a bent
         gamma curve, something in front of the window.
         """
-        check_levels(self.name, self.shape, levels)
-        self._worker.call("showing a picture", SECONDS, lambda: self._show(levels))
-
-    def close(self) -> None:
-        """Take the window away."""
-        self._worker.stop(SECONDS, self._close)
-
-    def _open(self) -> None:
-        self._screen = matching(screens(), self._settings)
-        self._window = Window(self._screen)
-        if self._window.shape != self.shape:
-            rows, columns = self._window.shape
-            raise DeviceError(
-                f"{self.name}: the window has {columns}x{rows} pixels; set this monitor's scaling to 100 %"
-            )
-
-    def _pump(self) -> None:
-        if self._window:
-            self._window.pump()
-
-    def _show(self, levels: Levels) -> None:
-        if self._window is None:
-            raise DeviceError(f"{self.name} has no window")
+        assert self._window is not None
         back = self._window.draw(levels)
         if altered := _difference(back, levels):
             raise DeviceError(f"{self.name}: the graphics driver altered the picture: {altered}")
@@ -105,7 +88,13 @@ class MonitorSlm:
             "it, scaling, colour management, dithering"
         )
 
-    def _close(self) -> None:
+    def idle(self) -> None:
+        """Look after the window."""
+        if self._window:
+            self._window.pump()
+
+    def close(self) -> None:
+        """Take the window away."""
         if self._window:
             self._window.close()
             self._window = None

@@ -17,7 +17,6 @@ from annotated_types import Interval, MinLen
 from ...core.errors import UserError
 from ..devices import Counts, DeviceError
 from .driver import Driver
-from .own import Own, opened
 from .worker import closed_on_failure
 
 STALE = 5  # frames that a driver may hold back although it is asked for one
@@ -148,8 +147,4 @@ def list_cameras() -> list[str]:
     return sorted(str(link) for link in Path("/dev/v4l/by-id").glob("*"))
 
 
-def _opens(settings: OpencvSettings) -> Own:
-    return opened("camera", f"camera {settings.device}", lambda: OpencvCamera(settings))
-
-
-DRIVERS = (Driver("camera", "opencv", OpencvSettings, _opens, "opencv-python-headless", "", list_cameras),)
+DRIVERS = (Driver("camera", "opencv", OpencvSettings, OpencvCamera, "opencv-python-headless", "", list_cameras),)

@@ -12,7 +12,7 @@ from ...core.errors import UserError
 from ...core.plugins import fields_of
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
-from .driver import Driver, Kind, check_counts, check_levels, load
+from .driver import Driver, Kind, load
 from .worker import Worker, closed_on_failure
 
 OPENING, SHOWING, READING = 120.0, 20.0, 20.0  # seconds; some SDKs upload a look-up table first
@@ -41,8 +41,8 @@ class Own:
     exposures: tuple[float, float]
     show_sequence: Callable[[Any], None]
 
-    def __init__(self, kind: Kind, device: Any, worker: Worker | None = None) -> None:
-        """device: open, and closed with this; worker: the thread that opened it. UserError: it lacks something."""
+    def __init__(self, kind: Kind, device: Any, worker: Worker) -> None:
+        """device: open, and closed with this; worker: the thread it lives on. UserError: it lacks something."""
         name = str(getattr(device, "name", "") or f"{kind} {type(device).__name__}")
         for key, right in NEEDS[kind].items():
             try:
@@ -52,8 +52,10 @@ class Own:
             if not good:
                 what = f"{key} is {getattr(device, key)!r}" if hasattr(device, key) else f"it has no '{key}'"
                 raise UserError(f"{name}: {what}; expected {right}")
-        self._device, self._worker = device, worker or Worker(name)
-        self.name = self._worker.name = name
+        self._device, self._worker = device, worker
+        self._size: tuple[int, ...] = ()  # of the first frame
+        self.name, self._worker.idle = name, getattr(device, "idle", None)
+        self._worker.name = name
         if kind == "slm":
             self.shape = int(device.shape[0]), int(device.shape[1])
             if hasattr(device, "show_sequence"):
@@ -69,11 +71,24 @@ class Own:
         """See `Camera`; DeviceError for what is no photograph, and for whatever the device raises."""
         limit = READING + EXPOSURES * seconds
         given = self._worker.call("taking a picture", limit, lambda: self._device.expose(seconds))
-        if not isinstance(given, tuple) or len(given) != 2 or not isinstance(given[1], float | int | np.number):
-            raise DeviceError(f"{self.name}: expose returned {type(given).__name__}; expected (counts, seconds)")
-        frame = np.array(given[0])  # a copy, since a device may fill its memory again
-        check_counts(self.name, frame, self.white, "; set white, or shift the counts down")
-        return frame, float(given[1])
+        try:
+            counts, real = given
+            frame, real = np.array(counts), float(real)  # a copy, since a device may fill its memory again
+        except (TypeError, ValueError):
+            types = [type(each).__name__ for each in given] if isinstance(given, tuple) else [type(given).__name__]
+            what = f"expose returned {', '.join(types)}; expected (counts, seconds)"
+            raise DeviceError(f"{self.name}: {what}") from None
+        planes = frame.ndim == 2 or (frame.ndim == 3 and frame.shape[2] == 3)
+        if frame.dtype not in (np.uint8, np.uint16) or not planes or not frame.size:
+            right = "whole counts, uint8 or uint16 of (H, W) or (H, W, 3)"
+            raise DeviceError(f"{self.name} gave {frame.dtype} of {frame.shape}; expected {right}")
+        if frame.shape != (self._size or frame.shape):
+            raise DeviceError(f"{self.name}: a frame of {frame.shape} follows one of {self._size}")
+        self._size = frame.shape
+        if frame.max() > self.white:
+            what = f"{frame.max()} counts, but {self.white:.0f} are its white; set white, or shift the counts down"
+            raise DeviceError(f"{self.name} gave {what}")
+        return frame, real
 
     def close(self) -> None:
         """Give the device back."""
@@ -81,7 +96,9 @@ class Own:
 
     def _show(self, function: Callable[[list[Levels]], Any], *frames: Levels) -> None:
         for frame in frames:
-            check_levels(self.name, self.shape, frame)
+            if frame.dtype != np.uint8 or frame.shape != self.shape:  # nothing is converted
+                given = f"{frame.dtype} of {frame.shape}"
+                raise DeviceError(f"{self.name} takes uint8 levels of {self.shape}, not {given}")
         copies = [frame.copy() for frame in frames]  # a device may keep what it is given
         self._worker.call("showing a picture", SHOWING, lambda: function(copies))
 
@@ -94,14 +111,11 @@ def own_driver(kind: Kind, name: str) -> Driver:
     except (TypeError, ValueError, NameError) as error:
         raise UserError(f"{owner}: its parameters cannot be taken from a bench file: {error}") from error
 
-    def opens(params: Any) -> Own:
-        return opened(kind, f"{kind} {cls.__name__}", lambda: cls(**vars(params)))
-
-    return Driver(kind, name, settings, opens, "", "", list)
+    return Driver(kind, name, settings, lambda params: cls(**vars(params)), "", "", list)
 
 
 def opened(kind: Kind, name: str, make: Callable[[], Any]) -> Own:
-    """A device that ``make`` gives, on a thread of its own. UserError and DeviceError as of `Own`."""
+    """A device that ``make`` gives, on a thread of its own. UserError: it lacks something. DeviceError: it fails."""
     worker = Worker(name)
     with closed_on_failure(lambda: worker.stop(0, lambda: None)):
         return worker.call("opening", OPENING, lambda: Own(kind, make(), worker))

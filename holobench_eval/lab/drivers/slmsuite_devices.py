@@ -21,7 +21,6 @@ from ...core.errors import UserError, suggest
 from ...imaging.convention import Levels
 from ..devices import Counts, DeviceError
 from .driver import Driver, Kind, import_package, load
-from .own import Own, opened
 from .worker import line
 
 Hardware = Literal["slms", "cameras"]
@@ -122,28 +121,14 @@ def _find(kind: Hardware, device: str) -> Any:
     return device_classes[name]
 
 
-def _build(kind: Kind, settings: SlmsuiteSettings, maker: Any) -> Any:
-    try:
-        device = maker(**settings.arguments)
-    except ImportError as error:
-        raise UserError(f"device '{settings.device}' needs its maker's software: {line(error)}") from error
-    except (TypeError, ValueError) as error:
-        raise UserError(f"device '{settings.device}' cannot be built with these arguments: {line(error)}") from error
-    return theirs(kind, device)
-
-
 def theirs(kind: Kind, device: Any) -> SlmsuiteSlm | SlmsuiteCamera:
-    """An open device with slmsuite's interface. UserError for another one."""
-    try:
-        return SlmsuiteSlm(device) if kind == "slm" else SlmsuiteCamera(device)
-    except AttributeError as error:
-        raise UserError(f"{kind} without the interface of slmsuite's: {error}") from error
+    """An open device with slmsuite's interface. AttributeError for another one."""
+    return SlmsuiteSlm(device) if kind == "slm" else SlmsuiteCamera(device)
 
 
 def _driver(kind: Kind, hardware: Hardware, words: str, example: str) -> Driver:
-    def opens(settings: SlmsuiteSettings) -> Own:
-        maker = _find(hardware, settings.device)
-        return opened(kind, f"slmsuite {settings.device}", lambda: _build(kind, settings, maker))
+    def opens(settings: SlmsuiteSettings) -> SlmsuiteSlm | SlmsuiteCamera:
+        return theirs(kind, _find(hardware, settings.device)(**settings.arguments))
 
     why = f"slmsuite does not look for {words}: give the class of yours as device, such as {example}"
     return Driver(

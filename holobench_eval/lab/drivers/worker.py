@@ -25,9 +25,9 @@ class Worker:
     idle: called between the calls, some twenty times a second, for libraries that want to be looked after.
     """
 
-    def __init__(self, name: str, idle: Callable[[], None] | None = None) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        self._idle = idle
+        self.idle: Callable[[], None] | None = None
         self._lost: str | None = None
         self._tasks: queue.Queue[tuple[Future[Any], Callable[[], Any]] | None] = queue.Queue()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -46,15 +46,15 @@ class Worker:
             return future.result(timeout=seconds)
         except (UserError, DeviceError):
             raise
-        except TimeoutError as error:
-            if future.done():  # the function's own
+        except BaseException as error:
+            if future.done():  # the function's own, sys.exit() among them
                 raise DeviceError(f"{self.name}: {what} failed: {line(error)}") from error
+            if not isinstance(error, TimeoutError):
+                raise
             self._lost = (
                 f"{self.name}: {what} took longer than {seconds:.3g} s; look at its cable and power, start again"
             )
             raise DeviceError(self._lost) from None
-        except Exception as error:
-            raise DeviceError(f"{self.name}: {what} failed: {line(error)}") from error
 
     def stop(self, seconds: float, function: Callable[[], Any]) -> None:
         """Call ``function`` a last time and end the thread; whatever goes wrong is past caring. Again does nothing."""
@@ -67,7 +67,7 @@ class Worker:
     def _run(self) -> None:
         while True:
             try:
-                task = self._tasks.get(timeout=TICK if self._idle else None)
+                task = self._tasks.get(timeout=TICK if self.idle else None)
             except queue.Empty:
                 self._rest()
                 continue
@@ -81,10 +81,10 @@ class Worker:
 
     def _rest(self) -> None:
         try:
-            if self._idle:
-                self._idle()
+            if self.idle:
+                self.idle()
         except Exception:  # shows itself at the next call, whose answer somebody waits for
-            self._idle = None
+            self.idle = None
 
 
 @contextlib.contextmanager

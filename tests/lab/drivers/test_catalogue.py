@@ -102,7 +102,8 @@ def test_looking_for_devices_survives_broken_packages(monkeypatch: pytest.Monkey
 
 def test_every_call_and_the_idling_between_are_on_one_thread_that_is_not_the_callers() -> None:
     idled: list[int] = []
-    worker = Worker("panel", idle=lambda: idled.append(threading.get_ident()))
+    worker = Worker("panel")
+    worker.idle = lambda: idled.append(threading.get_ident())
     threads = {worker.call("a call", PATIENCE, threading.get_ident) for _ in range(3)}
     deadline = time.monotonic() + PATIENCE
     while not idled and time.monotonic() < deadline:

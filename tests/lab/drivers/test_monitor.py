@@ -8,7 +8,9 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
-from holobench_eval.lab.drivers.monitor import MonitorSettings, MonitorSlm, list_monitors, matching
+from holobench_eval.lab.drivers.catalogue import open_device
+from holobench_eval.lab.drivers.monitor import MonitorSettings, list_monitors, matching
+from holobench_eval.lab.drivers.own import Own
 from tests.support.benches.two_monitors import PANEL, PANEL_AT, Eyes, two_monitors
 
 SHAPE = (1080, 1920)
@@ -23,8 +25,8 @@ def desktop() -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def slm(desktop: str) -> Iterator[MonitorSlm]:
-    slm = MonitorSlm(MonitorSettings(**PANEL))
+def slm(desktop: str) -> Iterator[Own]:
+    slm = open_device("slm", "monitor", PANEL)
     yield slm
     slm.close()
 
@@ -42,7 +44,7 @@ def every_level() -> np.ndarray:
     return ((rows * 7 + columns * 5 + (rows * columns) % 3) % 256).astype(np.uint8)
 
 
-def test_every_level_of_every_pixel_is_at_once_what_another_program_sees(slm: MonitorSlm, eyes: Eyes) -> None:
+def test_every_level_of_every_pixel_is_at_once_what_another_program_sees(slm: Own, eyes: Eyes) -> None:
     levels = every_level()
     assert np.array_equal(np.unique(levels), np.arange(256))
     for picture in (levels, np.random.default_rng(1).integers(0, 256, SHAPE, dtype=np.uint8)):
@@ -69,7 +71,7 @@ def test_the_pointer_is_invisible_on_the_panel_and_a_notice_or_a_bent_gamma_curv
     slm.show(levels)
 
 
-def test_levels_of_another_shape_or_type_are_never_converted(slm: MonitorSlm) -> None:
+def test_levels_of_another_shape_or_type_are_never_converted(slm: Own) -> None:
     with pytest.raises(DeviceError, match="takes uint8 levels"):
         slm.show(np.zeros((1080, 1919), np.uint8))
     with pytest.raises(DeviceError, match="takes uint8 levels"):
@@ -80,7 +82,7 @@ def test_levels_of_another_shape_or_type_are_never_converted(slm: MonitorSlm) ->
 def test_another_name_or_resolution_is_refused_with_what_was_found(desktop: str, asked: dict) -> None:
     assert list_monitors() == ["DUMMY0 1024x768", "DUMMY1 1920x1080"]
     with pytest.raises(UserError, match=r"no monitor '.*'; found: DUMMY0 1024x768, DUMMY1 1920x1080"):
-        MonitorSlm(MonitorSettings(**{**PANEL, **asked}))
+        open_device("slm", "monitor", {**PANEL, **asked})
 
 
 def test_two_monitors_of_one_name_or_no_desktop_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,7 +96,7 @@ def test_two_monitors_of_one_name_or_no_desktop_are_one_line(monkeypatch: pytest
 
 
 def test_a_closed_panel_says_so_and_closing_again_does_nothing(desktop: str) -> None:
-    slm = MonitorSlm(MonitorSettings("DUMMY0", (1024, 768), check="framebuffer"))
+    slm = open_device("slm", "monitor", {"name": "DUMMY0", "resolution": [1024, 768], "check": "framebuffer"})
     slm.show(np.zeros((768, 1024), np.uint8))
     slm.close()
     slm.close()

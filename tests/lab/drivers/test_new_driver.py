@@ -25,6 +25,8 @@ class LineSettings:
 
 
 class LineCamera:
+    white, exposures = 255, (0.1, 1.0)
+
     def __init__(self, settings):
         self.pixels = settings.pixels
 

@@ -10,8 +10,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.lab.devices import DeviceError
+from holobench_eval.lab.drivers.catalogue import adopted
 from holobench_eval.lab.drivers.opencv_camera import STALE, OpencvCamera, OpencvSettings
-from holobench_eval.lab.drivers.own import Own
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="V4L2's values of the controls")
 
@@ -110,7 +110,7 @@ def test_colour_comes_as_red_green_blue_and_sixteen_bits_with_their_white() -> N
     assert colour.expose(1e-4)[0][0, 0].tolist() == [2, 3, 4]
     deep = StandIn(frame=np.full((1, 48 * 64), 4000, np.uint16))
     settings = OpencvSettings("/dev/cam", (64, 48), (1e-4, 1.0), format="Y16", bits=12)
-    grey = Own("camera", OpencvCamera(settings, deep))
+    grey = adopted("camera", OpencvCamera(settings, deep))
     assert (grey.expose(1e-4)[0].shape, grey.white) == ((48, 64), 4095)
     deep.frame = np.full((48, 64), 5000, np.uint16)
     with pytest.raises(DeviceError, match="5001 counts, but 4095 are its white"):

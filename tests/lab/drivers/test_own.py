@@ -98,10 +98,10 @@ def test_a_panel_and_a_camera_of_one_file_know_of_each_other_and_live_on_a_threa
         ("Camera", {"serial": 7}, "parameter 'serial': .* got 7"),
         ("Camera", {"serial": "7", "gian": 1}, "has no parameter 'gian'; did you mean 'gain'"),
         ("Camera", {"serial": "7", "gain": 5}, "parameter 'gain': .* less than or equal to 4, got 5"),
-        ("Camra", {}, "there is no 'Camra' in .*mine.py; did you mean 'Camera'"),
-        ("shown", {}, "there is no 'shown'"),
+        ("Camra", {}, "'Camra' of .*mine.py is not there; did you mean 'Camera'"),
+        ("shown", {}, "'shown' of .*mine.py is no class or function; allowed: .*Camera"),
         ("Broken", {}, r"'\*\*others' takes any parameters"),
-        ("", {}, "there is no ''"),
+        ("", {}, "'' of .*mine.py is not there"),
     ],
 )
 def test_a_wrong_name_or_parameter_is_one_line_before_any_device_moves(
@@ -115,7 +115,7 @@ def test_a_wrong_name_or_parameter_is_one_line_before_any_device_moves(
 def test_what_cannot_be_opened_is_one_line(own: str, tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("import an_sdk_that_is_not_installed\n")
     for driver, line in (
-        (f"{own}:Refuses", "camera Refuses: opening failed: OSError: no licence"),
+        (f"{own}:Refuses", ":Refuses': opening failed: OSError: no licence"),
         (f"{own}:Panel", "wall: it has no 'expose'; expected expose"),
         (f"{tmp_path}/bad.py:Mine", "cannot be imported: ModuleNotFoundError: No module named 'an_sdk"),
         (f"{tmp_path}/none.py:Mine", "cannot be imported: FileNotFoundError"),
@@ -157,11 +157,28 @@ def test_what_a_camera_lacks_is_said_with_what_would_be_right(key: str, value: A
         adopted("camera", camera)
 
 
+def test_a_class_and_an_object_that_fails_are_no_open_devices() -> None:
+    class Unplugged:
+        @property
+        def name(self) -> str:
+            raise OSError("unplugged")
+
+    for device, line in (
+        (Whole, "camera is the class Whole; expected an open device of it"),
+        (Unplugged(), "camera: opening failed: OSError: unplugged"),
+    ):
+        with pytest.raises(UserError, match=line):
+            adopted("camera", device)
+
+
 @pytest.mark.parametrize(
     ("given", "line"),
     [
         (np.zeros((3, 4), np.uint16), "expose returned ndarray; expected (counts, seconds)"),
-        ((np.zeros((3, 4), np.uint16), None), "expected (counts, seconds)"),
+        ((np.zeros((3, 4), np.uint16), None), "expose returned ndarray, NoneType; expected (counts, seconds)"),
+        ((0.1, np.zeros((3, 4), np.uint16)), "expose returned float, ndarray; expected (counts, seconds)"),
+        (([[1, 2], [3]], 0.1), "expose returned list, float; expected (counts, seconds)"),
+        (None, "expose returned NoneType"),
         (
             ([[1, 2]], 0.1),
             "gave int64 of (1, 2); expected whole counts, uint8 or uint16 of (H, W) or (H, W, 3)",
@@ -210,6 +227,6 @@ def test_a_class_with_slmsuites_interface_is_taken_from_a_module_a_file_and_as_a
         assert (int(frame.max()), seconds) == (500, 0.5)
         camera.close()
     with pytest.raises(
-        UserError, match="camera without the interface of slmsuite's: 'Less' object has no attribute 'close'"
+        DeviceError, match="'slmsuite': opening failed: AttributeError: 'Less' object has no attribute 'close'"
     ):
         open_device("camera", "slmsuite", {"device": f"{tmp_path}/theirs.py:Less"})
