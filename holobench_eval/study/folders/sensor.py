@@ -17,7 +17,7 @@ BINS = 500  # up to the brightest; counts less a dark frame pile up in a few of 
 FEWEST = 20  # bins up to the brightest, of captures of few levels
 PILE = 2.5e-4  # of the samples in three bins: fewer are no pile
 BELOW = 6  # bins: a pile has more than these and all above it, where light and noise leave fewer and fewer
-SAME = 1.5 / 255  # of white: levels of a target that are equal
+SAME = 0.012  # of their value: levels of a target that are equal, as bright ones that are neighbours in 8 bits
 NOISY = 0.03  # of its value, between neighbours that are equal in the target: then no part of a capture is even
 
 RING = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
@@ -66,11 +66,17 @@ def _pile(plane: Frame, warp: Warp) -> float:
 
 def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     """Whether a pile is that of an even part of the target, in a capture ``(h, w)`` without noise."""
-    same = np.abs(target - np.median(target[piled])) <= SAME
-    rest = ~(piled[:, 1:] | piled[:, :-1]) & (np.abs(np.diff(target)) <= SAME) & (capture[:, 1:] > 0)
-    steps = np.abs(np.diff(capture))[rest] / capture[:, 1:][rest]
-    quiet = not steps.size or float(np.median(steps)) < NOISY
-    return bool(quiet and same[piled].mean() > 0.9 and piled[same].mean() > 0.5)
+    low, high = np.percentile(capture[piled], (5, 95))
+    typical = float(np.median(target[piled]))
+    same = np.abs(target - typical) <= (SAME + (high - low) / high) * typical
+    inside = cv2.erode(same.astype(np.uint8), np.ones((5, 5))) > 0  # where blur takes no light away
+    beside = (np.abs(np.diff(target)) <= SAME * typical) & (capture[:, 1:] > 0)
+    top, rest = beside & piled[:, 1:] & piled[:, :-1], beside & ~(piled[:, 1:] | piled[:, :-1])
+    steps, light = np.abs(np.diff(capture)), capture[:, 1:]
+    # The noise of a camera in the dark is none of less light, if the brightest has as much of it.
+    quiet = not rest.any() or float(np.median(steps[rest] / light[rest])) < NOISY
+    quiet = quiet or (top.any() and float(np.median(steps[rest])) <= 2 * float(steps[top].mean()))
+    return bool(quiet and same[piled].mean() > 0.9 and (not inside.any() or piled[inside].mean() > 0.5))
 
 
 def mended(frame: Frame, warp: Warp) -> tuple[Frame, int]:
