@@ -17,7 +17,7 @@ NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
 # leto-hazy less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
 LIFTED = 0.05
 ELSEWHERE = 0.75  # target pixels; below, what interpolation does to noise is most of a difference in dB
-MATTERS = 0.1  # dB, by which what stands out alone changes a score; speckle that looks so changes it by up to 0.07
+MATTERS = 0.2  # dB, by which what stands out alone changes a score; independent noise that looks so changes it by 0.17
 NOISE = 1.25  # of the darkest hundredth of a capture, which noise puts below its black level
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
 

@@ -19,10 +19,11 @@ PILE = 2.5e-4  # of the samples in three bins: fewer are no pile
 BELOW = 6  # bins: a pile has more than these and all above it, where light and noise leave fewer and fewer
 SAME = 0.012  # of their value: levels of a target that are equal, as bright ones that are neighbours in 8 bits
 NOISY = 0.03  # of its value, between neighbours that are equal in the target: then no part of a capture is even
+AROUND = np.ones((5, 5), np.uint8)  # as far as a blur takes light
 
 RING = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
 ALONE = 3.0  # times the spread of its neighbours, by which a pixel stands out: of full speckle one in 500 does
-STEP, LINE = 0.05, 0.01  # of the brightest hundredth: by which a pixel stands out, and a row by its median
+STEP, LINE = 0.05, 0.01  # of the brightest thousandth: by which a pixel stands out, and a row by its median
 MOSAIC = 1.1  # between the means of every second row and column
 
 
@@ -69,9 +70,9 @@ def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     low, high = np.percentile(capture[piled], (5, 95))
     typical = float(np.median(target[piled]))
     same = np.abs(target - typical) <= (SAME + (high - low) / high) * typical
-    inside = cv2.erode(same.astype(np.uint8), np.ones((5, 5))) > 0  # where blur takes no light away
-    beside = (np.abs(np.diff(target)) <= SAME * typical) & (capture[:, 1:] > 0)
-    top, rest = beside & piled[:, 1:] & piled[:, :-1], beside & ~(piled[:, 1:] | piled[:, :-1])
+    inside = cv2.erode(same.astype(np.uint8), AROUND) > 0
+    even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target) & (capture > 0)
+    top, rest = piled[:, 1:] & piled[:, :-1], even[:, 1:] & even[:, :-1]
     steps, light = np.abs(np.diff(capture)), capture[:, 1:]
     # The noise of a camera in the dark is none of less light, if the brightest has as much of it.
     quiet = not rest.any() or float(np.median(steps[rest] / light[rest])) < NOISY
@@ -94,7 +95,7 @@ def mended(frame: Frame, warp: Warp) -> tuple[Frame, int]:
 
 
 def _mended(plane: Frame) -> Frame:
-    dark, bright = np.percentile(plane, (1, 99)).astype(np.float32)
+    dark, bright = np.percentile(plane, (1, 99.9)).astype(np.float32)
     even, bright = plane - dark, bright - dark
     sites = np.array([[np.median(even[row::2, column::2]) for column in (0, 1)] for row in (0, 1)])
     if sites.max() > MOSAIC * sites.min() > 0:
