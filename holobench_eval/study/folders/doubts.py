@@ -73,7 +73,8 @@ def _odd(captures: Sequence[Record], folders: Folders, psnr: str) -> Iterator[st
     """A sentence about captures whose scores depend on what a camera does and light does not."""
     scores = [(record, record.values()) for record in captures]
     gains = [(v[f"{psnr}_mended"] - v[psnr], record, v) for record, v in scores if f"{psnr}_mended" in v]
-    if not (odd := sorted((one for one in gains if one[0] > MATTERS), key=lambda one: -one[0])):
+    odd = sorted((one for one in gains if one[0] > MATTERS / 4), key=lambda one: -one[0])
+    if not odd or odd[0][0] <= MATTERS:
         return
     without = [f"{_name(r)} {v[psnr] + gain:.2f} dB for {v[psnr]:.2f} ({v['odd_pixels']:.0f})" for gain, r, v in odd]
     dark = folders.captures[odd[0][1].label, odd[0][1].target].dark

@@ -71,11 +71,12 @@ def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     typical = float(np.median(target[piled]))
     same = np.abs(target - typical) <= (SAME + (high - low) / high) * typical
     inside = cv2.erode(same.astype(np.uint8), AROUND) > 0
-    even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target) & (capture > 0)
+    even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target)
     top, rest = piled[:, 1:] & piled[:, :-1], even[:, 1:] & even[:, :-1]
     steps, light = np.abs(np.diff(capture)), capture[:, 1:]
-    # The noise of a camera in the dark is none of less light, if the brightest has as much of it.
-    quiet = not rest.any() or float(np.median(steps[rest] / light[rest])) < NOISY
+    seen = rest & (light > low / BINS)
+    quiet = not rest.any() or (seen.any() and float(np.median(steps[seen] / light[seen])) < NOISY)
+    # Noise in the dark is that of the camera, if what is brightest has as much of it.
     quiet = quiet or (top.any() and float(np.median(steps[rest])) <= 2 * float(steps[top].mean()))
     return bool(quiet and same[piled].mean() > 0.9 and (not inside.any() or piled[inside].mean() > 0.5))
 
