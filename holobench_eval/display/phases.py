@@ -149,7 +149,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = F
     back = propagated(spec.region.embed(target.sqrt(), spec.shape).to(torch.complex64), spec, back=True)
     image = squared_modulus(propagated(back, spec))  # of light whose amplitude is free, too
     most = {grain: float(_compared(image, target, spec, grain)[""].mean()) for grain in LEAST}
-    has = {FINE: own, COARSE: _fits(phase, target, spec, COARSE)[""]}
+    has = {FINE: own, COARSE: _fits(phase, target, spec, COARSE).get("", 0.0)}  # a fine pattern is even
     numbers = f"{has[COARSE]:.2f} with its target on the nominal model, where {most[COARSE]:.2f} can be had"
     if any(has[grain] >= least * most[grain] for grain, least in LEAST.items()):
         return ""

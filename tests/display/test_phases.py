@@ -253,6 +253,8 @@ def test_nothing_is_said_where_there_is_nothing_to_compare_or_no_light(display, 
     draw = torch.rand(shape, generator=torch.Generator().manual_seed(2))
     assert phase_doubt(torch.full(shape, 3.0), target, display.spec) == ""
     assert phase_doubt(6 * draw, torch.full_like(target, 0.5), display.spec) == ""
+    fine = (torch.arange(target.shape[-1]) // 2 % 2).expand_as(target).float()
+    assert phase_doubt(6 * draw, fine, display.spec) == ""
     red = target * torch.tensor([1.0, 0.0, 0.0]).view(3, 1, 1)
     assert phase_doubt(phase, red, display.spec) == ""
     assert "opposite sign" in phase_doubt(-phase, red, display.spec)

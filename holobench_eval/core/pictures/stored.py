@@ -84,10 +84,11 @@ class Stored:
             allowed = (SRGB_GAMMA, LINEAR_GAMMA) if linear else (SRGB_GAMMA,)
             if all(abs(self.gamma - right) > SLACK for right in allowed):
                 raise PictureError(f"its gAMA is {self.gamma:g}, that of sRGB {SRGB_GAMMA}; convert it to sRGB")
-        if self.channels == 3 and self.primaries and np.abs(np.subtract(self.primaries, SRGB_PRIMARIES)).max() > APART:
+        stated = self.primaries if self.channels == 3 and len(self.primaries) == len(SRGB_PRIMARIES) else SRGB_PRIMARIES
+        if np.abs(np.subtract(stated, SRGB_PRIMARIES)).max() > APART:
             raise PictureError("its primaries or its white are not those of sRGB; convert it to sRGB")
         if self.colour_space != EXIF_SRGB and not (linear and self.colour_space == UNCALIBRATED):
-            right = f"that of sRGB {EXIF_SRGB}, and it has no profile; convert it to sRGB"
+            right = f"that of sRGB {EXIF_SRGB}, and it has no profile; convert it to sRGB, or take this entry out"
             raise PictureError(f"its EXIF colour space is {self.colour_space}, {right}")
 
     def values(self) -> NDArray[Any]:

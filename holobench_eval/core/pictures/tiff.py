@@ -99,7 +99,7 @@ def _facts(page: TiffPage) -> dict[str, Any]:
         "is_lossy": page.compression in LOSSY,
         "orientation": orientation,
         "profile": page.iccprofile or b"",
-        "primaries": tuple(top / (bottom or 1) for top, bottom in zip(ratios[::2], ratios[1::2], strict=True)),
+        "primaries": tuple(top / (bottom or 1) for top, bottom in zip(ratios[::2], ratios[1::2], strict=False)),
         "colour_space": (page.tags.valueof("ExifTag") or {}).get("ColorSpace", 1),
         "white_is_zero": photometric == WHITE_IS_ZERO,
     }

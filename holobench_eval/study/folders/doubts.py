@@ -17,7 +17,7 @@ NEARLY_ITSELF = 40.0  # dB: the noise of a good camera alone leaves less
 # leto-hazy less than 2 %, and a black level of 6 % of full scale gives 3 to 17 %.
 LIFTED = 0.05
 ELSEWHERE = 0.75  # target pixels; below, what interpolation does to noise is most of a difference in dB
-MATTERS = 0.1  # dB, by which what stands out alone changes a score; speckle that looks so changes it by up to 0.07
+MATTERS = 0.2  # dB, by which what stands out alone changes a score; independent noise that looks so changes it by 0.17
 NOISE = 1.25  # of the darkest hundredth of a capture, which noise puts below its black level
 ABOVE_CONSTANT = 20.0  # dB: in a target that is nearly black, every picture of it has a high PSNR
 
@@ -73,7 +73,8 @@ def _odd(captures: Sequence[Record], folders: Folders, psnr: str) -> Iterator[st
     """A sentence about captures whose scores depend on what a camera does and light does not."""
     scores = [(record, record.values()) for record in captures]
     gains = [(v[f"{psnr}_mended"] - v[psnr], record, v) for record, v in scores if f"{psnr}_mended" in v]
-    if not (odd := sorted((one for one in gains if one[0] > MATTERS), key=lambda one: -one[0])):
+    odd = sorted((one for one in gains if one[0] > MATTERS / 4), key=lambda one: -one[0])
+    if not odd or odd[0][0] <= MATTERS:
         return
     without = [f"{_name(r)} {v[psnr] + gain:.2f} dB for {v[psnr]:.2f} ({v['odd_pixels']:.0f})" for gain, r, v in odd]
     dark = folders.captures[odd[0][1].label, odd[0][1].target].dark

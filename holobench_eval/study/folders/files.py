@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from .pictures import SUFFIXES, Picture, checked
 
 CAPTURE_SUFFIXES = (*SUFFIXES, NUMBERS, *RAW_SUFFIXES)
 NAMED = 3
-TOLD = 5  # faults that a line tells
+TOLD = 24  # faults that a line tells, those of a folder of two methods
 
 Key = tuple[str, str]  # method and name of the target
 AT_TARGET = (PLAIN, RESIZE, SAVE_TARGET)
@@ -62,16 +62,16 @@ def read_folders(captures: Path, targets: Path, linear: bool = False, dark: Dark
         capture_paths |= {
             (folder.name, path.stem): path for path in _pictures(folder, captures, expected, CAPTURE_SUFFIXES)
         }
-    _refuse(
+    alone = [
         f"{path}: no target of this name in {targets}; "
         + (_twice(path, target_paths.values()) or f"{suggest(name, target_paths)}; rename it or take it away")
         for (_, name), path in capture_paths.items()
         if name not in target_paths
-    )
+    ]
     pictures, wrong = _read(target_paths, _target)
-    _refuse(wrong.values())
     photographs, unread = _read(capture_paths, lambda path: _capture(path, linear, dark))
-    _refuse(unread.values() if not photographs else ())
+    if alone or wrong or not photographs:
+        _refuse([*alone, *wrong.values(), *unread.values()])
     pairings = {key: paired(picture, pictures[key[1]]) for key, picture in photographs.items()}
     return Folders(pictures, photographs, unread, pairings, tuple(_notes(pictures, photographs, pairings)))
 
@@ -105,10 +105,10 @@ def _capture(path: Path, linear: bool, dark: Dark | None) -> Picture:
     return picture
 
 
-def _refuse(faults: Iterable[str]) -> None:
+def _refuse(faults: Sequence[str]) -> None:
     """UserError, one line, that tells several faults, if there are any."""
-    if found := list(faults):
-        raise UserError("; ".join([*found[:TOLD], *[f"and {len(found) - TOLD} more"] * (len(found) > TOLD)]))
+    if faults:
+        raise UserError("; ".join([*faults[:TOLD], *[f"and {len(faults) - TOLD} more"] * (len(faults) > TOLD)]))
 
 
 def _twice(capture: Path, targets: Iterable[Path]) -> str:

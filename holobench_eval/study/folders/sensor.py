@@ -17,12 +17,13 @@ BINS = 500  # up to the brightest; counts less a dark frame pile up in a few of 
 FEWEST = 20  # bins up to the brightest, of captures of few levels
 PILE = 2.5e-4  # of the samples in three bins: fewer are no pile
 BELOW = 6  # bins: a pile has more than these and all above it, where light and noise leave fewer and fewer
-SAME = 1.5 / 255  # of white: levels of a target that are equal
+SAME = 0.012  # of their value: levels of a target that are equal, as bright ones that are neighbours in 8 bits
 NOISY = 0.03  # of its value, between neighbours that are equal in the target: then no part of a capture is even
+AROUND = np.ones((5, 5), np.uint8)  # as far as a blur takes light
 
 RING = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
 ALONE = 3.0  # times the spread of its neighbours, by which a pixel stands out: of full speckle one in 500 does
-STEP, LINE = 0.05, 0.01  # of the brightest hundredth: by which a pixel stands out, and a row by its median
+STEP, LINE = 0.05, 0.01  # of the brightest thousandth: by which a pixel stands out, and a row by its median
 MOSAIC = 1.1  # between the means of every second row and column
 
 
@@ -66,11 +67,18 @@ def _pile(plane: Frame, warp: Warp) -> float:
 
 def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     """Whether a pile is that of an even part of the target, in a capture ``(h, w)`` without noise."""
-    same = np.abs(target - np.median(target[piled])) <= SAME
-    rest = ~(piled[:, 1:] | piled[:, :-1]) & (np.abs(np.diff(target)) <= SAME) & (capture[:, 1:] > 0)
-    steps = np.abs(np.diff(capture))[rest] / capture[:, 1:][rest]
-    quiet = not steps.size or float(np.median(steps)) < NOISY
-    return bool(quiet and same[piled].mean() > 0.9 and piled[same].mean() > 0.5)
+    low, high = np.percentile(capture[piled], (5, 95))
+    typical = float(np.median(target[piled]))
+    same = np.abs(target - typical) <= (SAME + (high - low) / high) * typical
+    inside = cv2.erode(same.astype(np.uint8), AROUND) > 0
+    even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target)
+    top, rest = piled[:, 1:] & piled[:, :-1], even[:, 1:] & even[:, :-1]
+    steps, light = np.abs(np.diff(capture)), capture[:, 1:]
+    seen = rest & (light > low / BINS)
+    quiet = not rest.any() or (seen.any() and float(np.median(steps[seen] / light[seen])) < NOISY)
+    # Noise in the dark is that of the camera, if what is brightest has as much of it.
+    quiet = quiet or (top.any() and float(np.median(steps[rest])) <= 2 * float(steps[top].mean()))
+    return bool(quiet and same[piled].mean() > 0.9 and (not inside.any() or piled[inside].mean() > 0.5))
 
 
 def mended(frame: Frame, warp: Warp) -> tuple[Frame, int]:
@@ -88,7 +96,7 @@ def mended(frame: Frame, warp: Warp) -> tuple[Frame, int]:
 
 
 def _mended(plane: Frame) -> Frame:
-    dark, bright = np.percentile(plane, (1, 99)).astype(np.float32)
+    dark, bright = np.percentile(plane, (1, 99.9)).astype(np.float32)
     even, bright = plane - dark, bright - dark
     sites = np.array([[np.median(even[row::2, column::2]) for column in (0, 1)] for row in (0, 1)])
     if sites.max() > MOSAIC * sites.min() > 0:

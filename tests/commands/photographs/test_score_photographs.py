@@ -337,16 +337,16 @@ def test_all_bad_files_of_a_folder_are_told_at_once(tmp_path, folder):
     assert terminal.str.contains("not an image").sum() == 6
     for path in tmp_path.glob("captures/b/*"):
         path.write_bytes(b"")
-    with pytest.raises(UserError, match=r"a/t0.png: not an image.*a/t4.png: not an image.*; and 7 more$"):
+    with pytest.raises(UserError) as told:
         run(tmp_path, "linear", aligned=True)
+    assert str(told.value).count(": not an image") == 12
     for name in ("t1", "t3"):
         (tmp_path / "targets" / f"{name}.png").write_bytes(b"")
-    with pytest.raises(UserError, match=r"targets/t1.png: not an image.*targets/t3.png: not an image"):
+    (tmp_path / "targets" / "t5.png").unlink()
+    with pytest.raises(UserError) as told:
         run(tmp_path, "linear", aligned=True)
-    for name in ("t1", "t3"):
-        (tmp_path / "targets" / f"{name}.png").rename(tmp_path / "targets" / f"{name}x.png")
-    with pytest.raises(UserError, match=r"a/t1.png: no target.*a/t3.png: no target.*b/t1.png: no target"):
-        run(tmp_path, "linear", aligned=True)
+    faults = (": not an image", "t5.png: no target of this name")
+    assert [str(told.value).count(fault) for fault in faults] == [14, 2]
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e-300, 1e38])

@@ -32,8 +32,17 @@ def flat_topped() -> np.ndarray:
     return (np.round(picture * 255) / 255).astype(np.float32)
 
 
+def written() -> np.ndarray:
+    """Black words on white."""
+    page = np.full(SHAPE, 255, np.uint8)
+    for line in range(8):
+        cv2.putText(page, "holography 123", (5, 22 + 22 * line), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0,), 1)
+    return (page / 255).astype(np.float32)
+
+
 PHOTOGRAPH = (np.round(photograph("astronaut", SHAPE).mean(axis=0) * 255) / 255).astype(np.float32)
 TARGETS = {"photograph": PHOTOGRAPH, "flat": flat_topped(), "two levels": (PHOTOGRAPH > 0.5).astype(np.float32)}
+TARGETS |= {"text": written(), "a box in the dark": np.pad(np.ones((10, 10), np.float32), ((90, 92), (120, 126)))}
 LIGHT = {name: light_of(target) + 0.01 for name, target in TARGETS.items()}
 
 
@@ -90,6 +99,12 @@ HONEST = {
     "no noise and a blur": lambda name: cv2.GaussianBlur(counted(0.45 * LIGHT[name]), (0, 0), 0.8),
     "few levels": lambda name: counted(0.1 * noisy(name), 255),
     "full speckle": lambda name: counted((0.1 * LIGHT[name] * draw().exponential(size=SHAPE)).clip(0, 1)),
+    "a camera's noise and a blur": lambda name: counted(
+        cv2.GaussianBlur(0.7 * LIGHT[name] - 0.007, (0, 0), 0.8) + draw().normal(0, 3 / 4095, SHAPE)
+    ).clip(0),
+    "no noise in 8 bits and a blur": lambda name: cv2.GaussianBlur(
+        counted(0.8 * LIGHT[name] - 0.008, 255), (0, 0), 0.8
+    ),
     "a black level": lambda name: counted(0.4 * noisy(name) + 0.0625),
 }
 
@@ -143,6 +158,11 @@ def test_what_stands_out_from_all_around_it_is_seen_and_its_cost_told(kind, blac
     assert cost > 3 * MATTERS
     assert left < 0.7 * cost
     assert count > 0
+
+
+def test_noise_about_a_small_object_in_the_dark_is_no_fault_of_a_camera():
+    capture = counted((0.3 * (LIGHT["a box in the dark"] - 0.01) + draw().normal(0, 0.001, SHAPE)).clip(0), 255)
+    assert mended(capture.astype(np.float32)[None], IN_PLACE)[1] == 0
 
 
 @pytest.mark.parametrize("contrast", [0.05, 0.3, 0.6, 1.0])
