@@ -60,7 +60,7 @@ def solve(
     is_new, config, work = not folder.exists(), folder / STUDY, _work(folder)
     _copy(picture, folder)
     if not _is_free(folder, picture, study_in(folder)):
-        raise UserError(f"{folder}: holds the report of other methods or of another display; choose another --output")
+        raise UserError(f"{folder}: holds the work of other methods, parameters or displays; choose another --output")
     config.write_text(study_in(folder), encoding="utf-8")
     try:
         study = load_study(config)

@@ -41,7 +41,8 @@ FAINT = 0.03  # of the mean amplitude; of a target with less contrast, right pha
 JUMP = 10 * math.tau  # rad between neighbours, which radians, wrapped or smooth, have no need of
 EDGE = 0.02  # of a span, by which the values of a phase in another unit may miss its ends
 CAUSES = (
-    "other optics, a correction map missing or left in, faults of a display that it makes up for, or a rough method"
+    "other optics or turns, a correction map missing or left in, faults of a display that it makes up for, or a rough "
+    "method"
 )
 FACTOR = "multiplied by"
 TIE = 0.001  # by which a later meaning has to fit better, and a factor by ten times that: a unit is nearly one

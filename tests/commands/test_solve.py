@@ -148,7 +148,7 @@ def test_a_report_of_other_methods_pictures_or_displays_stays(picture):
     solve("double_phase", picture, display="ideal", panel=(128, 128))  # the second once more
     assert sorted(path.name for path in Path("holoeval-results").iterdir()) == [*names, "solved"]
     for method in ("gerchberg_saxton", "wirtinker"):
-        with pytest.raises(UserError, match=r"holds the report of other methods or of another display; choose another"):
+        with pytest.raises(UserError, match=r"holds the work of other methods, parameters or displays; choose another"):
             solve(method, picture, display="ideal", panel=(128, 128), output=Path("holoeval-results", names[1]))
     assert [file.read_text() for file in left] == texts
 

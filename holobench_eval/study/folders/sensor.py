@@ -72,12 +72,10 @@ def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     same = np.abs(target - typical) <= (SAME + (high - low) / high) * typical
     inside = cv2.erode(same.astype(np.uint8), AROUND) > 0
     even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target)
-    top, rest = piled[:, 1:] & piled[:, :-1], even[:, 1:] & even[:, :-1]
-    steps, light = np.abs(np.diff(capture)), capture[:, 1:]
+    steps, light, rest = np.abs(np.diff(capture)), capture[:, 1:], even[:, 1:] & even[:, :-1]
     seen = rest & (light > low / BINS)
     quiet = not rest.any() or (seen.any() and float(np.median(steps[seen] / light[seen])) < NOISY)
-    # Noise in the dark is that of the camera, if what is brightest has as much of it.
-    quiet = quiet or (top.any() and float(np.median(steps[rest])) <= 2 * float(steps[top].mean()))
+    quiet = quiet or float(np.median(steps[rest])) <= high - low  # noise in the dark, of which the pile has as much
     return bool(quiet and same[piled].mean() > 0.9 and (not inside.any() or piled[inside].mean() > 0.5))
 
 
