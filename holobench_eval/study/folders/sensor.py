@@ -73,6 +73,8 @@ def _even(capture: Frame, target: Frame, piled: Mask) -> bool:
     inside = cv2.erode(same.astype(np.uint8), AROUND) > 0
     even = ~piled & (cv2.dilate(target, AROUND) - cv2.erode(target, AROUND) <= SAME * target)
     steps, light, rest = np.abs(np.diff(capture)), capture[:, 1:], even[:, 1:] & even[:, :-1]
+    if not (rest.any() or inside.any()):  # a fine pattern
+        rest = ~(piled[:, 1:] | piled[:, :-1]) & (np.abs(np.diff(target)) <= SAME * target[:, 1:])
     seen = rest & (light > low / BINS)
     quiet = not rest.any() or (seen.any() and float(np.median(steps[seen] / light[seen])) < NOISY)
     quiet = quiet or float(np.median(steps[rest])) <= high - low  # noise in the dark, of which the pile has as much
