@@ -119,6 +119,7 @@ def state_of(path: str) -> State | str | None:
 IMPORTED = Seen()
 """By the imports of users' files and packages in this process."""
 _recorder: Seen | None = None
+_others: frozenset[int] = frozenset()  # threads that were there before, such as those that serve a scheduler
 _noting = threading.local()
 
 
@@ -129,14 +130,15 @@ def recorded() -> Iterator[Seen]:
     Cached bytecode is valid for a source of the same size and the same second, so a file that is rewritten within a
     second would run as it was before.
     """
-    global _recorder
+    global _recorder, _others
     _install()
-    before, _recorder = _recorder, Seen()
+    before, _recorder = (_recorder, _others), Seen()
+    _others = frozenset(thread.ident or 0 for thread in threading.enumerate()) - {threading.get_ident()}
     try:
         with _announced(), patch.object(sys, "dont_write_bytecode", True):
             yield _recorder
     finally:
-        _recorder = before
+        _recorder, _others = before
 
 
 @cache
@@ -173,7 +175,8 @@ def _absolute(path: Any, folder: int | None = None) -> str:
 
 def _is_anothers(frame: FrameType | None, importing: bool = False) -> bool:
     """Whether it is not the user's code that opens a file, but the display, in a method's call, or an installed package
-    as it is imported, which happens once in a process. A method's own code comes first on the way out.
+    as it is imported, which happens once in a process, or a thread from before. A method's own code comes first on the
+    way out.
 
     importing: whether what an import itself opens is not the user's either.
     """
@@ -186,7 +189,7 @@ def _is_anothers(frame: FrameType | None, importing: bool = False) -> bool:
                 return False
             importing = True
         frame = frame.f_back
-    return False
+    return threading.get_ident() in _others
 
 
 def so_far() -> str | None:
