@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,16 +14,28 @@ from holobench_eval.study.versions import method_version
 from tests.support.edits import AFTER, BEFORE, FORMS, LAYOUTS, Place
 
 
+@pytest.fixture(autouse=True)
+def _forgotten_afterwards(monkeypatch) -> Iterator[None]:
+    """What a package of a test has registered and read is not for the next; its paths are taken back before."""
+    yield
+    monkeypatch.undo()
+    forget()
+
+
+def forget() -> None:
+    importlib.invalidate_caches()
+    for known in (plugins._entries, plugins._kept_adapter, released.file_of):
+        known.cache_clear()  # type: ignore[attr-defined]
+    vars(reads.IMPORTED).update(vars(reads.Seen()))
+
+
 def built(place: Place, name: str) -> Any:
     if place.layout != "installed":
         return plugins.build("methods", place.method(name), {}, place.config.parent)
     for module, loaded in list(sys.modules.items()):
         if str(place.root) in str(vars(loaded).get("__spec__")):
             del sys.modules[module]  # as in a process that begins
-    importlib.invalidate_caches()
-    for known in (plugins._entries, plugins._kept_adapter, released.file_of):
-        known.cache_clear()  # type: ignore[attr-defined]
-    vars(reads.IMPORTED).update(vars(reads.Seen()))
+    forget()
     return plugins.build("methods", place.method(name), {})
 
 
