@@ -6,12 +6,11 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from ..data.phrases import marked
-from ..data.results import Results
-from ..data.scores import DOMAIN_NAMES, Score
-from ..data.statistics import LEVEL, NONE, SIGNIFICANCE, Estimate, PairedTest
-from ..data.tables import rounded
-from ..data.text import FILES, words
+from .phrases import marked
+from .results import Results, rounded
+from .scores import DOMAIN_NAMES, Score
+from .statistics import LEVEL, NONE, SIGNIFICANCE, Estimate, PairedTest
+from .text import FILES, words
 
 _HEAD = """% The headline table of every display, with the numbers of table.csv and tests.csv.
 % In the preamble: \\usepackage{booktabs,siunitx}. A table is 84 mm wide at most, its type 7 pt (\\scriptsize at 10 pt).
@@ -59,7 +58,7 @@ def _table(results: Results, condition: str) -> str:
             r"\begin{table}",
             r"  \centering\scriptsize\setlength{\tabcolsep}{2pt}\setlength{\belowcaptionskip}{4pt}",
             f"  \\caption{{{' '.join(_caption(results, condition))}}}",
-            f"  \\label{{tab:{_slug(results.layout.study)}-{_slug(condition)}}}",
+            f"  \\label{{tab:{_slug(results.study.name)}-{_slug(condition)}}}",
             f"  \\begin{{tabular}}{{@{{}}{' '.join(specs)}@{{}}}}",
             r"    \toprule",
             f"    {' & '.join(headings)} \\\\",
@@ -75,7 +74,7 @@ def _table(results: Results, condition: str) -> str:
 
 def _columns(results: Results, condition: str) -> Iterator[_Column]:
     labels, score, ssim = _complete(results, condition), results.headline, _ssim(results)
-    rows = [results.row(label, condition) for label in labels]
+    rows = [results.rows[label, condition] for label in labels]
     unit = f" [{escape(score.unit)}]" if score.unit else ""
     names = [" ".join(map(_breakable, marked(results, label, condition).split())) for label in labels]
     yield rf">{{\raggedright\arraybackslash}}p{{{_LABEL_MM}mm}}", "method", names
@@ -134,7 +133,7 @@ def _complete(results: Results, condition: str) -> list[str]:
 
 def _tests(results: Results, condition: str) -> dict[str, PairedTest]:
     """The tests against the baseline on a display, by the tested method; empty without a baseline."""
-    return {test.second: test for test in results.against_baseline if test.condition == condition}
+    return {test.second: test for test in results.tests.values() if test.condition == condition}
 
 
 def _ssim(results: Results) -> Score | None:
@@ -144,26 +143,26 @@ def _ssim(results: Results) -> Score | None:
 
 def _counts_captures(results: Results, condition: str) -> bool:
     """Whether the captures behind every row are known."""
-    captures = (results.row(label, condition)["total_captures"] for label in _complete(results, condition))
+    captures = (results.rows[label, condition]["total_captures"] for label in _complete(results, condition))
     return not any(map(math.isnan, captures))
 
 
 def _caption(results: Results, condition: str) -> Iterator[str]:
     """What was measured, on what, over what, and what the signs mean."""
-    layout, score, ssim = results.layout, results.headline, _ssim(results)
-    size = layout.panels.get(condition)
+    score, ssim, known = results.headline, _ssim(results), results.facts.displays
+    size = known.at[condition, "panel"] if condition in known.index else None
     display = f"{_what(results)}{f', panel {size[0]} x {size[1]} pixels' if size else ''}"
     same = ssim is not None and ssim.domain == score.domain
     names = [score.title if same else _named(score), *([_named(ssim)] if ssim else [])]
     n, clusters = len(results.targets), len(set(results.clusters))
     among = f"{n} targets in {clusters} clusters" if clusters != n else f"{n} targets"
-    compared = f"{layout.text.scored}s against {layout.text.truth}s"
+    compared = f"{results.text.scored}s against {results.text.truth}s"
     yield escape(f"{words(names)} of {compared} on {condition} ({display}): means over {among}.")
     over = "clusters" if clusters != n else "targets"
     yield f"$\\pm$: half of the {100 * LEVEL:.0f}\\,\\% interval (Student's t over {over})."
     if _tests(results, condition):
-        count = sum(not math.isnan(test.p) for test in results.against_baseline)
-        yield f"$\\Delta$: paired difference from {escape(layout.baseline)}."
+        count = sum(not math.isnan(test.p) for test in results.tests.values())
+        yield f"$\\Delta$: paired difference from {escape(results.baseline)}."
         yield (
             f"*: adjusted $p < {SIGNIFICANCE:g}$ (sign flips of {over}, {count} comparisons)."
             if count
@@ -174,10 +173,9 @@ def _caption(results: Results, condition: str) -> Iterator[str]:
 
 
 def _what(results: Results) -> str:
-    layout = results.layout
-    if layout.measure == FILES:
+    if results.study.measure == FILES:
         return "photographs from files"
-    return "a trained network" if layout.learned_display is not None else "real" if layout.real else "simulated"
+    return "a trained network" if results.facts.network else "real" if results.study.display.real else "simulated"
 
 
 def _named(score: Score) -> str:

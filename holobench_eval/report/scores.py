@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import pandas as pd
 
-from ...metrics.catalogue import catalogue
+from ..metrics.catalogue import catalogue
 from .statistics import Estimate
 from .text import bracketed
 

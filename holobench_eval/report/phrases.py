@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ...core import plugins
-from ...core.errors import listed, one_line
-from ...study.folders.files import named
-from ...study.versions import EDITED, dataset_version
-from .column import DONE
-from .results import Results
+from ..core import plugins
+from ..core.errors import listed, one_line
+from ..study.folders.files import named
+from ..study.versions import EDITED, dataset_version
+from .facts import ORACLE
+from .results import DONE, Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
 from .text import words
@@ -39,12 +39,6 @@ def verdict(score: Score, test: PairedTest) -> str:
     return "better" if score.better(test.estimate.mean, 0.0) else "worse"
 
 
-def tested(results: Results, label: str, condition: str) -> PairedTest | None:
-    """The comparison of a method with the baseline on a display; None where there is no complete pair of rows."""
-    both = (label, str(results.layout.baseline))
-    return results.tests.get((label, condition)) if all(results.is_complete(name, condition) for name in both) else None
-
-
 def value(results: Results, label: str, condition: str) -> str:
     """The mean of the headline with its unit: ``20.62 dB``."""
     return results.headline.with_unit(float(results.values(label, condition).mean()))
@@ -52,34 +46,34 @@ def value(results: Results, label: str, condition: str) -> str:
 
 def marked(results: Results, label: str, condition: str) -> str:
     """A method's label with what must be known of its row: an oracle, a fallback, a network that learned too little."""
-    return ", ".join([results.layout.marked(label), *marks(results, label, condition)])
+    return ", ".join([results.facts.marked(label), *marks(results, label, condition)])
 
 
 def counted(results: Results, label: str, condition: str) -> str:
     """``marked``, and how many targets have a score where that is not all: for tables without a column of that."""
-    scored, total = results.row(label, condition)["n"], len(results.targets)
+    scored, total = results.rows[label, condition]["n"], len(results.targets)
     return f"{marked(results, label, condition)}{f', {scored:.0f} of {total} targets' * bool(scored < total)}"
 
 
 def marks(results: Results, label: str, condition: str) -> Iterator[str]:
     """What must be known of a row."""
-    cells = results.cells(label, condition)
+    cells = results.cells[label, condition]
     if "fell_back" in cells and (cells["fell_back"] != "").any():
         yield "fell back to Wirtinger"
     if "stop_reason" in cells and (ended := cells.loc[cells["stop_reason"] != "", "target"].nunique()):
         yield f"stopped by the display on {ended} target{'s' * (ended > 1)}"
-    if results.layout.measure == "prediction" and (below := _below(results, label, condition)):
+    if results.study.measure == "prediction" and (below := _below(results, label, condition)):
         yield f"not trained to convergence: below {words(below)}"
-    if results.layout.measure == "picture" and (rival := _dominating(results, label, condition)):
+    if results.study.measure == "picture" and (rival := _dominating(results, label, condition)):
         yield f"dominated by {rival}"
 
 
 def _below(results: Results, label: str, condition: str) -> list[str]:
     """What predicts the captures better than a trained method though it takes no training."""
-    layout = results.layout
-    if label not in layout.trained - layout.identities or not results.is_complete(label, condition):
+    is_identity = results.facts.labels("identity")
+    if label not in results.facts.labels("trained") - is_identity or not results.is_complete(label, condition):
         return []
-    untrained = [name for name in layout.identities if name in results.methods(condition)]
+    untrained = [name for name in is_identity if name in results.methods(condition)]
     means = [("the ideal image", results.values(name, condition).mean()) for name in untrained]
     if (floor := results.floor(condition)) is not None:
         means.insert(0, ("the constant image", floor))
@@ -90,9 +84,9 @@ def _below(results: Results, label: str, condition: str) -> list[str]:
 def _dominating(results: Results, label: str, condition: str) -> str:
     """The best method without photographs that is as fast as a network without photographs, where the network is not
     shown to be better; empty where there is none."""
-    rows = {name: results.row(name, condition) for name in results.ranking(condition)}
+    rows = {name: results.rows[name, condition] for name in results.ranking(condition)}
     blind = {name: row.get("solving_s", np.nan) for name, row in rows.items() if row.get("total_captures") == 0}
-    if label not in blind or label not in results.layout.trained:
+    if label not in blind or label not in results.facts.labels("trained"):
         return ""
     rival = next(name for name, seconds in blind.items() if name == label or seconds <= blind[label])
     gain = results.estimate(results.values(label, condition) - results.values(rival, condition))
@@ -126,7 +120,7 @@ def edited(records: Sequence[Mapping[str, Any]]) -> str:
 def too_few(results: Results) -> str:
     """That no test of two methods can show anything on so few clusters; empty where one can, and without any test."""
     rivals = max(
-        (len({*results.methods(name)} - {*results.layout.privileged}) for name in results.conditions), default=0
+        (len({*results.methods(name)} - {*[label for label in results.labels if results.category(label) == ORACLE]}) for name in results.conditions), default=0
     )
     clusters = len(set(results.clusters))
     smallest = 2.0 ** (1 - clusters)

@@ -7,6 +7,7 @@ site, the terminal and the tables of the documentation are drawn from it.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,12 +16,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .layout import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
-from .phrases import marks, tested, verdict
-from .results import Results
+from .columns import dictionary
+from .facts import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
+from .latex import latex_tables
+from .phrases import marks, verdict
+from .results import Results, csv_text, to_json
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
-from .tables import to_json
 
 # In the order of the board.
 GROUPS = {
@@ -86,13 +88,13 @@ class Board:
 
     def as_json(self) -> dict[str, Any]:
         """Ready for JSON: no NaN, and six significant digits as in table.csv."""
-        layout, score = self.results.layout, self.results.headline
+        study, score = self.results.study, self.results.headline
         return {
             "board": VERSION,
-            "study": layout.study,
-            "title": layout.title,
-            "question": layout.question,
-            "baseline": layout.baseline,
+            "study": study.name,
+            "title": study.title,
+            "question": study.question,
+            "baseline": self.results.baseline,
             "headline": {"key": score.key, "title": score.axis, "unit": score.unit, "higher": score.higher_is_better},
             "targets": len(self.results.targets),
             "clusters": len(set(self.results.clusters)),
@@ -112,7 +114,7 @@ class Board:
     def _row(self, row: Row) -> dict[str, Any]:
         return {
             "method": row.label,
-            "title": self.results.layout.titles.get(row.label),
+            "title": self.results.facts.of(row.label, "title") or None,
             "registered": self.results.names[row.label],
             "tier": row.tier,
             "targets": row.scored,
@@ -138,7 +140,7 @@ def board(results: Results) -> Board:
 def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Display:
     groups = []
     for category in GROUPS:
-        labels = [label for label in results.methods(condition) if results.layout.category(label) == category]
+        labels = [label for label in results.methods(condition) if results.category(label) == category]
         if labels:
             groups.append((category, tuple(_rows(results, condition, labels, beside))))
     return Display(condition, tuple(groups), results.floor(condition))
@@ -150,13 +152,13 @@ def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Sco
     values = np.array([results.values(label, condition) for label in complete])
     letters = dict(zip(complete, tiers(values, results.clusters), strict=True))
     for label in [*complete, *(label for label in labels if label not in complete)]:
-        row = results.row(label, condition)
+        row = results.rows[label, condition]
         yield Row(
             label,
-            letters.get(label, "") if label not in results.layout.privileged else "",
+            letters.get(label, "") if results.category(label) != ORACLE else "",
             results.headline.of(row),
             int(row["n"]),
-            tested(results, label, condition),
+            results.tested(label, condition),
             tuple(float(row[score.column]) for score in beside),
             _known(row, "total_captures"),
             _known(row, "panel_time"),
@@ -184,3 +186,11 @@ def _mean(results: Results, label: str, condition: str) -> float:
 
 def _ends(estimate: Estimate) -> dict[str, float | None]:
     return {"mean": to_json(estimate.mean), "low": to_json(estimate.low), "high": to_json(estimate.high)}
+
+
+def texts(results: Results) -> dict[str, str]:
+    """The text of each file for programs and papers, by its name."""
+    frames = {"records.csv": results.frame, "table.csv": results.table, "tests.csv": results.tests_table}
+    drawn = json.dumps(board(results).as_json(), indent=1, ensure_ascii=False, allow_nan=False)
+    written = {name: csv_text(frame) for name, frame in frames.items()} | {"board.json": f"{drawn}\n"}
+    return written | {"columns.md": f"{dictionary(frames)}\n", "table.tex": latex_tables(results)}

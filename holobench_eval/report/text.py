@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from ...core.errors import listed
-from ...study.folders import FILES as FILES
+from ..core.errors import listed
+from ..study.definition import Study
+from ..study.folders import FILES as FILES
 from .statistics import Estimate
 
 K = TypeVar("K")
@@ -209,3 +210,16 @@ BY_MEASURE = {
     "views": VIEWS,
     FILES: GIVEN,
 }
+
+
+def text_of(study: Study, on_a_network: bool) -> Text:
+    """The words of a study. on_a_network: whether its display is a trained network."""
+    text = ON_A_NETWORK if on_a_network and study.measure == "picture" else BY_MEASURE[study.measure]
+    if study.measure == FILES:
+        values = str(study.targets.params["values"])
+        text = replace(text, compared=COMPARED[values], caution=AS_STORED if values == "stored" else text.caution)
+    if study.display.real:
+        text = replace(text, displays=REAL)
+    name = study.holograms.name
+    procedure, picture = (words.replace("{holograms}", name) for words in (text.procedure, text.picture))
+    return replace(text, procedure=procedure, picture=picture)

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from ...core.seeds import seed
+from ..core.seeds import seed
 
 LEVEL = 0.95
 SIGNIFICANCE = 0.05
