@@ -17,7 +17,7 @@ from ..core.errors import listed, printable
 
 if TYPE_CHECKING:
     from ..report import Results
-    from ..report.data.board import Board, Display
+    from ..report.board import Board, Display
     from ..study.definition import Study
 
 MOST_REASONS = 10  # that a terminal shows; details.md has all
@@ -54,7 +54,7 @@ def write_report(
     known: its provenance; keep_pictures: see build_report.
     """
     from ..report import build_report
-    from ..report.data.phrases import edited, uncovered
+    from ..report.phrases import edited, uncovered
 
     written, results = build_report(study, records, output, known, keep_pictures)
     print_headline(console, results)
@@ -71,8 +71,8 @@ def write_report(
 def print_headline(console: Console, results: Results) -> None:
     """Print the board of every display unless there are many, in 80 columns; and what is odd about phases."""
     from ..report.data import over_displays
-    from ..report.data.board import board
-    from ..report.data.phrases import remarks
+    from ..report.board import board
+    from ..report.phrases import remarks
 
     drawn = board(results)
     for display in [] if over_displays.applies(results) else drawn.displays:
@@ -83,17 +83,17 @@ def print_headline(console: Console, results: Results) -> None:
 
 def board_of(drawn: Board, display: Display) -> Table:
     """A display's board for a terminal; the report has the other columns. Only names are broken into lines."""
-    from ..report.data.board import GROUPS
-    from ..report.data.text import FILES, number
+    from ..report.board import GROUPS
+    from ..report.text import FILES, number
 
     results, score = drawn.results, drawn.results.headline
     table = Table(title=escape(f"{display.name}: {score.heading}"), title_justify="left")
     table.add_column("", no_wrap=True)
     table.add_column("method", overflow="fold")
     table.add_column(escape(f"{score.title} [{score.unit}]" if score.unit else score.title), no_wrap=True)
-    if results.layout.baseline:
-        table.add_column(escape(f"against {results.layout.baseline}"), overflow="fold")
-    spends = results.layout.measure != FILES and results.layout.spends_captures
+    if results.baseline:
+        table.add_column(escape(f"against {results.baseline}"), overflow="fold")
+    spends = results.study.measure != FILES and results.facts.spends
     if spends:
         table.add_column("photos", justify="right", no_wrap=True)
     for group, rows in display.groups:
@@ -101,7 +101,7 @@ def board_of(drawn: Board, display: Display) -> Table:
             table.add_row("", f"[bold]{GROUPS[group]}[/]")
         for row in rows:
             cells = [row.tier, ", ".join([row.label, *drawn.marks(row)]), score.number(row.score.mean)]
-            if results.layout.baseline:
+            if results.baseline:
                 cells.append(score.estimate(row.test.estimate, signed=True) if row.test else "")
             cells += ["–" if row.photographs is None else number(row.photographs)] if spends else []
             table.add_row(*map(escape, cells))
@@ -115,7 +115,7 @@ def print_answer(console: Console, results: Results) -> None:
     is worse than a constant image has a rank, too.
     """
     from ..report.answers import kind_of
-    from ..report.data.phrases import too_few
+    from ..report.phrases import too_few
 
     for sentence in (*kind_of(results).answer(results), *filter(None, [too_few(results)])):
         console.print(f"- {sentence}", markup=False)

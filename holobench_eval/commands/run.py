@@ -181,7 +181,7 @@ def draw_stages(display: Condition, note: str, seed: int, output: Path) -> None:
 def sheets(study: Study, output: Path) -> list[partial[None]]:
     """What draws the stages of each display of a study, of many the first alone; networks and real ones have none."""
     from ..display import load_profile
-    from ..report.data.statistics import FEWEST_DISPLAYS
+    from ..report.statistics import FEWEST_DISPLAYS
     from ..study.displays import condition
 
     panel, folder, profiles = study.display.panel, study.folder, study.display.profiles

@@ -87,8 +87,7 @@ def score_folders(
     from ..lab.dark import given_dark
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
-    from ..report.data.layout import Layout
-    from ..study.folders import FILES
+    from ..report.facts import Layout
     from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import CONDITION, Scoring, described
@@ -113,21 +112,13 @@ def score_folders(
         for note in notes:
             console.print(note, markup=False, soft_wrap=True)
         known = provenance.end(output, known)
-        layout = Layout(
-            title=f"Scores of photographs: {listed(folders.methods)}",
-            pairs=tuple((method, CONDITION) for method in folders.methods),
-            targets=tuple(folders.targets),
-            headline=f"psnr_{scoring.domain}",
-            baseline=baseline,
-            note=" ".join(notes),
-            measure=FILES,
-            values=values,
-            study=output.resolve().name,
-        )
+        title = f"Scores of photographs: {listed(folders.methods)}"
+        pairs = [(method, CONDITION) for method in folders.methods]
+        facts = facts_of_files(output.resolve().name, title, pairs, tuple(folders.targets), values, " ".join(notes), baseline)
         given = {name: value for name, value in options.items() if value not in (None, False, "")}
         words = [word for name, value in given.items() for word in (name, *([] if value is True else [str(value)]))]
         command = shlex.join(["holoeval", "score", *words])
-        return write_report(layout, records, output, known, Description(command=command))
+        return write_report(facts, records, output, known, Description(command=command))
 
 
 def _refuse(options: Mapping[str, Any]) -> None:

@@ -11,14 +11,13 @@ from typing import Any
 from ..core.io import write_atomically
 from ..study.definition import Study
 from .charts.look.medium import MEDIA, drawn_for
-from .data.layout import Layout, layout_of
-from .data.results import Results
-from .data.tables import of_study, read_records, records_frame, records_text
+from .board import texts
 from .description import Description, describe
-from .files import texts, write_files
+from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks
 from .page import write_page
 from .page.pictures import keep_copies
+from .results import Results, of_study, read_records, records_frame, records_text
 from .section import Report
 from .sections import sections
 
@@ -41,21 +40,22 @@ def build_report(
     provenance: see ``study.running.provenance``; keep_pictures: keep the figures made of pictures that are there, with
     their captions, and draw the others alone. UserError when no record has the headline metric.
     """
-    return write_report(layout_of(study), records, output, provenance, describe(study), keep_pictures)
+    return write_report(facts_of(study), records, output, provenance, describe(study), keep_pictures)
 
 
 def write_report(
-    layout: Layout,
+    facts: Facts,
     records: Sequence[Mapping[str, Any]],
     output: Path,
     provenance: Mapping[str, Any],
     description: Description,
     keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
-    """``build_report`` for a study that is given by its layout and description."""
-    results = Results(records_frame(records, layout), layout, related(layout, output.parent))
+    """``build_report`` for a study that is given by its facts and description."""
+    results = Results(records_frame(records, facts), facts, related(facts, output.parent))
     report = Report(results, records, output, provenance, description, keep_pictures)
-    write_files(results, output)
+    for name, text in texts(results).items():
+        write_atomically(output / name, text.encode())
     for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
         for old in report.figures.glob(pattern):
             old.unlink()
@@ -85,19 +85,19 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
     return blocks([image, Markdown("**Figure {}.** {}").format(number, caption)])
 
 
-def related(layout: Layout, folder: Path) -> dict[str, Results]:
+def related(facts: Facts, folder: Path) -> dict[str, Results]:
     """Results of the related studies that have a report of their name in a folder."""
-    known = {name: folder / name / "records.csv" for name in layout.related}
+    known = {name: folder / name / "records.csv" for name in facts.related}
     return {
-        name: Results(of_study(read_records(records_text(path)), layout.related[name]), layout.related[name])
+        name: Results(of_study(read_records(records_text(path)), facts.related[name]), facts.related[name])
         for name, path in known.items()
         if path.is_file()
     }
 
 
-def recompute_files(records_csv: str, layout: Layout) -> dict[str, str]:
+def recompute_files(records_csv: str, facts: Facts) -> dict[str, str]:
     """The text of every file of data, by name, computed anew from that of records.csv; equal bytes belong together."""
-    return texts(Results(of_study(read_records(records_csv), layout), layout))
+    return texts(Results(of_study(read_records(records_csv), facts), facts))
 
 
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:

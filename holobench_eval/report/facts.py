@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import pandas as pd
 
@@ -16,7 +17,7 @@ from ..display.simulated.changes import KINDS, draws
 from ..display.simulated.profile import Profile, load_profile
 from ..study import isolation
 from ..study.config import load_study
-from ..study.definition import PREDICTIONS, Claim, Study
+from ..study.definition import PREDICTIONS, Claim, DisplayGrid, Measure, MethodEntry, Study, Targets
 from ..study.displays import Condition, changed, displays
 from ..study.folders import FILES
 from ..study.plan import is_reference
@@ -191,6 +192,36 @@ def facts_of(study: Study) -> Facts:
         },
         {name: facts_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
     )
+
+
+def facts_of_files(
+    name: str,
+    title: str,
+    pairs: Sequence[tuple[str, str]],
+    targets: tuple[str, ...],
+    values: str,
+    note: str,
+    baseline: str | None,
+) -> Facts:
+    """The facts of pictures that were given as files. name: of the report's folder; values: how they were read,
+    ``stored``, ``srgb`` or ``linear``."""
+    labels = list(dict.fromkeys(label for label, _ in pairs))
+    study = Study(
+        title,
+        DisplayGrid(),
+        Targets(FILES, {"values": values}, targets),
+        tuple(MethodEntry(label, label) for label in labels),
+        cast(Measure, FILES),
+        headline=f"psnr_{'stored' if values == 'stored' else 'linear'}",
+        baseline=baseline or "",
+        note=note,
+        file=Path(f"{name}.yaml"),
+    )
+    rows = {"cluster": targets, "scene": "", "place": math.nan}
+    known = {"category": GIVEN, "params": {}} | dict.fromkeys(("trained", "blind", "identity", "stacked"), False)
+    known |= {"method": "", "title": "", "tuned": None, "limit": math.nan}
+    methods = pd.DataFrame.from_dict({label: known for label in labels}, "index")
+    return Facts(study, methods, pd.DataFrame(), pd.DataFrame(rows, index=list(targets)), tuple(pairs))
 
 
 def _display(display: Condition) -> dict[str, Any]:

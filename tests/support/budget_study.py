@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from holobench_eval.report import Layout, Results, records_frame
+from holobench_eval.report import Facts, Results, records_frame
+from tests.support import made_facts
 from tests.support import synthetic_study as synthetic
 
 ROWS: dict[str, tuple[str, float, int, int, float]] = {
@@ -26,8 +27,8 @@ TARGETS = synthetic.TARGETS
 SEVERITY = {"leto-aged": 1.0, "ideal": 0.25}
 
 
-def layout(**changes: Any) -> Layout:
-    """The layout of the study."""
+def facts(**changes: Any) -> Facts:
+    """The facts of the study."""
     given = {
         "title": "Made-up budgets",
         "pairs": tuple((label, condition) for label in ROWS for condition in SEVERITY),
@@ -37,7 +38,7 @@ def layout(**changes: Any) -> Layout:
         "camera": frozenset(label for label in ROWS if label.startswith("online")),
         "trained": frozenset(label for label, row in ROWS.items() if row[2]),
     }
-    return Layout(**(given | changes))
+    return made_facts.facts(**(given | changes))
 
 
 def record(label: str, target: str, condition: str, quality: float, **changes: Any) -> synthetic.Record:
@@ -62,5 +63,5 @@ def study() -> list[synthetic.Record]:
 
 
 def results(**changes: Any) -> Results:
-    """The numbers of the study; changes: of its layout."""
-    return Results(records_frame(study(), layout(**changes)), layout(**changes))
+    """The numbers of the study; changes: of its facts."""
+    return Results(records_frame(study(), facts(**changes)), facts(**changes))

@@ -11,9 +11,10 @@ from skimage import data, io, transform
 from skimage.metrics import structural_similarity
 
 from holobench_eval.core.hashing import digest
-from holobench_eval.report import Layout, Results, records_frame
+from holobench_eval.report import Facts, Results, records_frame
 from holobench_eval.study.plan import FLOORS, REFERENCE, is_reference
 from holobench_eval.study.store import Store
+from tests.support import made_facts
 
 Image = NDArray[np.float64]
 Record = dict[str, Any]
@@ -32,7 +33,7 @@ SEVERITY = {"leto-aged": 1.0, "ideal": 0.5}
 TARGETS = ("astronaut", "chelsea", "coffee", "rocket", "retina", "camera")
 
 
-def layout(**changes: Any) -> Layout:
+def facts(**changes: Any) -> Facts:
     given = {
         "title": "Made-up captures",
         "pairs": tuple((label, condition) for label in DISTORTION for condition in SEVERITY),
@@ -43,7 +44,7 @@ def layout(**changes: Any) -> Layout:
         "reported": {"Wirtinger": {"psnr": 17.6, "ssim": 0.475}, "HIL": {"psnr": 20.5, "ssim": 0.625}},
         "reported_source": "Chakravarthula et al. 2020, Table 3",
     }
-    return Layout(**(given | changes))
+    return made_facts.facts(**(given | changes))
 
 
 @cache
@@ -147,12 +148,12 @@ def record(label: str, described: dict[str, Any], values: dict[str, float], **ch
 
 
 def results(records: list[Record], **changes: Any) -> Results:
-    """The numbers of some records, whose layout is theirs but for the changes."""
+    """The numbers of some records, whose facts are theirs but for the changes."""
     cells = [(found["label"], found["cell"]) for found in records]
     pairs = dict.fromkeys((label, cell["condition"]) for label, cell in cells if not is_reference(cell["condition"]))
     targets = dict.fromkeys(cell["target"] for _, cell in cells)
     given = {"pairs": tuple(pairs), "targets": tuple(targets), "privileged": frozenset(), "reported": {}}
-    made = layout(**(given | changes))
+    made = facts(**(given | changes))
     return Results(records_frame(records, made), made)
 
 

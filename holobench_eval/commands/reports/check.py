@@ -66,8 +66,8 @@ def kept_in(folder: Path, seed: int) -> list[str]:
     whose record, or whose row of records.csv, has another score."""
     from ...core.seeds import seed as seed_of
     from ...report import read_records, records_text
-    from ...report.data.scores import parse
-    from ...report.data.tables import score_columns
+    from ...report.scores import parse
+    from ...report.results import score_columns
     from ...study.plan import plan
     from ...study.scoring.job import Job, Setting
     from ...study.scoring.picture import verified
@@ -139,7 +139,7 @@ def _problems(report: Path) -> Iterator[str]:
 
 def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]:
     """What is different from when the report was made, of which its provenance is ``known``."""
-    from ...report import difference, layout_of, read_records, recompute_files, records_text
+    from ...report import difference, facts_of, read_records, recompute_files, records_text
     from ...study.displays import displays
     from ...study.identity import parted, versions
     from ...study.plan import plan
@@ -164,7 +164,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     for name in ("report.md", "details.md"):
         if not (report / name).is_file():
             yield f"{name} is missing; {command}"
-    files = recompute_files(records, layout_of(study))
+    files = recompute_files(records, facts_of(study))
     if said_anew:
         del files["board.json"]  # which has the title and the question
     for name, again in files.items():

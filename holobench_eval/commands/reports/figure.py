@@ -20,14 +20,14 @@ def figure(
     output: Output = None,
 ) -> None:
     """Draw the charts of a study for a talk or a paper: from its records, or from a committed records.csv."""
-    from ...report import Results, layout_of, records_frame
+    from ...report import Results, facts_of, records_frame
     from ...report.build import print_figures, related
     from ...report.description import describe
     from ...report.section import Report
 
     study, records, folder, known, _ = load(config, output)
-    layout = layout_of(study)
-    results = Results(records_frame(records, layout), layout, related(layout, folder.parent))
+    facts = facts_of(study)
+    results = Results(records_frame(records, facts), facts, related(facts, folder.parent))
     report = Report(results, records, folder, known, describe(study))
     for path in print_figures(report, into, medium):
         print(path)

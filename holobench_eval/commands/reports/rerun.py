@@ -92,7 +92,7 @@ def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, wh
         records.csv or an artifact is damaged.
     """
     from ...report.compare.paired import read_run
-    from ...report.data.tables import DONE, score_columns
+    from ...report.results import DONE, score_columns
     from ...study.plan import plan as plan_cells
 
     records, plan = read_run(report).records, plan_cells(study)
@@ -188,8 +188,8 @@ def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: E
 
     The other cells of their tasks, which share a solution with them, are recorded as skipped beforehand.
     """
-    from ...report.data.layout import layout_of
-    from ...report.data.tables import records_frame
+    from ...report.facts import facts_of
+    from ...report.results import records_frame
     from ...study.identity import scores_of
     from ...study.plan import Plan
     from ...study.running.progress import Lines
@@ -206,7 +206,7 @@ def _computed(study: Study, chosen: Sequence[Planned], artifacts: Path, where: E
                 store.write(Record(cell.description(), "skipped", label, "not in the sample"))
         threads = thread_count(None, where.workers, study)
         outcome = run(study, plan, store.output, where, Lines(lambda line: None), threads, artifacts)
-    return _by_key(records_frame(outcome.records, layout_of(study)))
+    return _by_key(records_frame(outcome.records, facts_of(study)))
 
 
 def _judge(
@@ -214,8 +214,8 @@ def _judge(
 ) -> None:
     """Count the numbers of the chosen cells that are reproduced, and note the others."""
     from ...metrics.protocol import VERSION as PROTOCOL
-    from ...report.data.scores import parse
-    from ...report.data.tables import DONE, rounded
+    from ...report.scores import parse
+    from ...report.results import DONE, rounded
 
     others = sum(each.cell.id != each.row["cell"] for each in chosen)
     if others:

@@ -9,16 +9,15 @@ import pandas as pd
 import pytest
 
 from holobench_eval.core.errors import UserError
-from holobench_eval.report import Results, csv_text, layout_of, read_records, records_frame
-from holobench_eval.report.data.layout import Swept
-from holobench_eval.report.data.tables import of_study
-from holobench_eval.report.files.tests_csv import comparison_frame
+from holobench_eval.report import Results, csv_text, facts_of, read_records, records_frame
+from holobench_eval.report.facts import Swept
+from holobench_eval.report.results import of_study
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE
 from tests.report.sections import test_sweeps as swept_study
 from tests.support import synthetic_study as synthetic
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 TARGETS = tuple(f"t{number}" for number in range(8))
 PARAMS = {"iterations": 200, "offset": None}
 
@@ -31,7 +30,7 @@ GIVEN = {
     "study": "toy",
     "seed": 20_261_123,
     "params": {"wirtinger, 200": PARAMS},
-    "capture_limits": {"hil": 25},
+    "limits": {"hil": 25},
     "panels": {"leto-aged": (192, 256)},
 }
 
@@ -74,7 +73,7 @@ def test_a_limit_of_captures_and_the_floor_are_told_apart() -> None:
 
 
 def test_a_swept_quantity_is_a_number_with_a_unit_or_a_name() -> None:
-    made = swept_study.layout()
+    made = swept_study.facts()
     cells = read(records_frame(swept_study.records(), made))
     points = cells.drop_duplicates("condition").set_index("condition")[["swept", "swept_value", "swept_unit"]]
     assert points.loc["leto-aged, drift 30.0"].tolist() == ["drift", 30.0, "days"]
@@ -108,7 +107,7 @@ def test_the_plane_of_a_focal_stack_is_a_swept_quantity() -> None:
 @pytest.mark.parametrize("report", ["table3", "table1", "error-budget"])
 def test_committed_records_are_read_and_written_without_a_loss(report: str) -> None:
     text = (ROOT / "reports" / report / "records.csv").read_text()
-    made = layout_of(load_study(ROOT / "configs" / f"{report}.yaml"))
+    made = facts_of(load_study(ROOT / "configs" / f"{report}.yaml"))
     frame = read_records(text)
     assert text == csv_text(frame)
     pd.testing.assert_frame_equal(of_study(frame, made), frame)
@@ -128,8 +127,8 @@ def test_the_table_leads_with_what_it_is_a_table_of_and_has_the_parameters_of_me
 
 def test_a_paired_test_has_the_numbers_of_the_report() -> None:
     found = results()
-    (expected,) = found.against_baseline
-    tests = read(comparison_frame(found))
+    (expected,) = found.tests.values()
+    tests = read(found.tests_table)
     assert len(tests) == 1
     row = tests.iloc[0]
     names = row[["study", "display", "method", "label", "baseline", "metric"]].tolist()
@@ -142,7 +141,7 @@ def test_a_paired_test_has_the_numbers_of_the_report() -> None:
 
 
 def test_the_tests_of_a_study_without_a_baseline_are_a_heading_alone() -> None:
-    assert len(csv_text(comparison_frame(results(baseline=None))).splitlines()) == 1
+    assert len(csv_text(results(baseline=None).tests_table).splitlines()) == 1
 
 
 HOSTILE = [

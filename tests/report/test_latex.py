@@ -8,20 +8,19 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from holobench_eval.report import Results, layout_of, read_records, records_frame
-from holobench_eval.report.files import write_files
-from holobench_eval.report.files.latex import escape, latex_tables
-from holobench_eval.report.files.tests_csv import comparison_frame
+from holobench_eval.report import Results, facts_of, read_records, records_frame
+from holobench_eval.report.board import texts
+from holobench_eval.report.latex import escape, latex_tables
 from holobench_eval.study.config import load_study
 from tests.support import synthetic_study as synthetic
-from tests.support.budget_study import ROWS, TARGETS, layout, study
+from tests.support.budget_study import ROWS, TARGETS, facts, study
 
 HOSTILE = "a_b & 10% $x$ \\input{x}"
 
 
 def results(**changes: object) -> Results:
     records = [record | {"scores": record["scores"] | {"ssim_linear": 0.4321}} for record in study()]
-    made = layout(study="budget", panels={"leto-aged": (192, 256)}, **changes)
+    made = facts(study="budget", panels={"leto-aged": (192, 256)}, **changes)
     return Results(records_frame(records, made), made)
 
 
@@ -44,7 +43,7 @@ def rows(text: str, display: str) -> dict[str, list[str]]:
 
 def test_the_numbers_are_those_of_the_csv_files() -> None:
     found = results()
-    table, tests = (frame.set_index(["condition", "label"]) for frame in (found.table, comparison_frame(found)))
+    table, tests = (frame.set_index(["condition", "label"]) for frame in (found.table, found.tests_table))
     shown = rows(latex_tables(found), "leto-aged")
     assert len(shown) == len(ROWS)
     for label in ("hil", "parametric_model (16 captures)", "online_camera_network"):
@@ -127,7 +126,7 @@ def test_the_tables_compile_and_fit_one_column(tmp_path: Path) -> None:
     assert (tmp_path / "paper.pdf").stat().st_size > 1000
 
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 EXAMPLES = re.findall(
     r"<!-- pandas -->\n```python\n(.*?)```", (ROOT / "docs" / "results" / "data.md").read_text(), re.DOTALL
 )
@@ -139,7 +138,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     report = tmp_path / "reports" / "leaderboard"
     report.mkdir(parents=True)
     records = read_records((ROOT / "reports" / "leaderboard" / "records.csv").read_text())
-    write_files(Results(records, layout_of(load_study(ROOT / "configs" / "leaderboard.yaml"))), report)
+    write_files(Results(records, facts_of(load_study(ROOT / "configs" / "leaderboard.yaml"))), report)
     monkeypatch.chdir(tmp_path)
     return report
 

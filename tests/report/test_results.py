@@ -1,4 +1,4 @@
-"""Layouts and tables: what a config orders, and what stands in the files of a report."""
+"""Facts and tables: what a config orders, and what stands in the files of a report."""
 
 import io
 import re
@@ -17,14 +17,13 @@ from holobench_eval.report import (
     committed_records,
     csv_text,
     difference,
-    layout_of,
+    facts_of,
     read_records,
     recompute_files,
     records_frame,
-    table_from_records,
 )
-from holobench_eval.report.data.scores import order_scores, parse
-from holobench_eval.report.data.statistics import Estimate
+from holobench_eval.report.scores import order_scores, parse
+from holobench_eval.report.statistics import Estimate
 from holobench_eval.report.description import describe
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
@@ -33,8 +32,8 @@ from tests.support import synthetic_study as synthetic
 from tests.support.reports import files
 from tests.support.studies.fake_study import PLUGINS, write_config
 
-PLAIN = synthetic.layout(
-    pairs=(("b", "bench"), ("a", "bench")), targets=("t2", "t1"), baseline="b", reported={}, privileged=frozenset()
+PLAIN = synthetic.facts(
+    pairs=(("b", "bench"), ("a", "bench")), targets=("t2", "t1"), baseline="b", reported={}, privileged=()
 )
 
 
@@ -59,11 +58,11 @@ def records(tmp_path_factory):
 
 
 def test_a_table_from_the_written_records_has_the_same_bytes_and_its_rows_follow_the_config(records):
-    found = Results(records_frame(records, synthetic.layout()), synthetic.layout())
+    found = Results(records_frame(records, synthetic.facts()), synthetic.facts())
     written = csv_text(found.frame)
-    assert recompute_files(written, found.layout)["table.csv"] == csv_text(found.table)
+    assert recompute_files(written, found.facts)["table.csv"] == csv_text(found.table)
     rows = list(zip(found.table["label"], found.table["condition"], strict=True))
-    assert rows == [*synthetic.layout().pairs, *((name, REFERENCE) for name in FLOORS)]
+    assert rows == [*synthetic.facts().pairs, *((name, REFERENCE) for name in FLOORS)]
 
 
 def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
@@ -71,8 +70,8 @@ def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
     alone = {"targets": ("t1", "t2", "t3", "t4", "t5", "t6"), "pairs": (("a", "bench"),), "baseline": None}
     grouped = alone | {"clusters": dict(zip(alone["targets"], "ppqqrr", strict=True))}
     wide, narrow = (
-        row_of(Results(records_frame(found, layout), layout).table, "a")
-        for layout in (synthetic.layout(**grouped), synthetic.layout(**alone))
+        row_of(Results(records_frame(found, facts), facts).table, "a")
+        for facts in (synthetic.facts(**grouped), synthetic.facts(**alone))
     )
     assert (wide["n"], wide["clusters"], wide["psnr_linear_median_db"]) == (6, 3, 2.25)
     assert wide["psnr_linear_db"] == narrow["psnr_linear_db"]
@@ -83,7 +82,7 @@ def test_clusters_and_the_median_stand_in_the_table_and_widen_the_interval():
 def test_cells_without_a_score_are_counted_and_are_in_no_mean():
     lost = rows({"t1": 0.0, "t2": 0.0}, label="b", state="unavailable", reason="needs a camera")
     failed = rows({"t1": 1.0}, state="failed", reason="no light")
-    table = table_from_records(records_frame([*lost, *failed, *rows({"t2": 2.0})], PLAIN), PLAIN)
+    table = Results(records_frame([*lost, *failed, *rows({"t2": 2.0})], PLAIN), PLAIN).table
     assert (row_of(table, "a")["n"], row_of(table, "a")["failed"], row_of(table, "a")["psnr_linear_db"]) == (1, 1, 2.0)
     assert (row_of(table, "b")["n"], row_of(table, "b")["failed"]) == (0, 2)
     assert np.isnan(row_of(table, "b")["psnr_linear_db"])
@@ -91,7 +90,7 @@ def test_cells_without_a_score_are_counted_and_are_in_no_mean():
 
 def test_repeats_are_averaged_within_a_target_first():
     several = [*rows({"t1": 10.0}, repeats=3), *rows({"t2": 20.0})]
-    row = row_of(table_from_records(records_frame(several, PLAIN), PLAIN), "a")
+    row = row_of(Results(records_frame(several, PLAIN), PLAIN).table, "a")
     assert row["n"] == 2
     assert row["psnr_linear_db"] == pytest.approx((11.0 + 20.0) / 2)
 
@@ -99,7 +98,7 @@ def test_repeats_are_averaged_within_a_target_first():
 def test_a_metric_that_some_targets_lack_has_no_mean():
     partial = rows({"t1": 10.0, "t2": 20.0})
     partial[0]["scores"] |= {"ssim_linear": 0.5, "speckle_contrast": 0.3}
-    row = row_of(table_from_records(records_frame(partial, PLAIN), PLAIN), "a")
+    row = row_of(Results(records_frame(partial, PLAIN), PLAIN).table, "a")
     assert np.isnan(row["ssim_linear"])
     assert row["speckle_contrast"] == 0.3
 
@@ -127,24 +126,24 @@ def timed(label="a", alone=ALONE):
 
 def test_the_seconds_of_a_row_are_those_of_what_was_timed_alone_if_anything_was():
     frame = records_frame([*timed(), *timed("b", {"t1": (5.0, False), "t2": (3.0, False)})], PLAIN)
-    table = table_from_records(frame, PLAIN)
+    table = Results(frame, PLAIN).table
     assert row_of(table, "a")["solving_s"] == 3.0
     assert row_of(table, "b")["solving_s"] == 4.0
     again = read_records(csv_text(frame))
-    assert csv_text(table_from_records(again, PLAIN)) == csv_text(table)
+    assert csv_text(Results(again, PLAIN).table) == csv_text(table)
 
 
 def test_records_that_do_not_say_what_was_beside_them_have_no_column_for_it_and_all_their_seconds_count():
     old = [{key: value for key, value in record.items() if key != "alone"} for record in timed()]
     frame = records_frame(old, PLAIN)
     assert "timed_alone" not in frame
-    assert row_of(table_from_records(frame, PLAIN), "a")["solving_s"] == 4.0
+    assert row_of(Results(frame, PLAIN).table, "a")["solving_s"] == 4.0
 
 
 @pytest.mark.parametrize("label", ["NA", "nan", "a,b", 'say "x"', "1e5", " padded ", "é"])
 def test_labels_survive_being_written_and_read(label):
-    layout = synthetic.layout(pairs=((label, "bench"),), targets=("t1",), reported={})
-    text = csv_text(records_frame(rows({"t1": 1.0}, label=label), layout))
+    facts = synthetic.facts(pairs=((label, "bench"),), targets=("t1",), reported={})
+    text = csv_text(records_frame(rows({"t1": 1.0}, label=label), facts))
     assert list(read_records(text)["label"]) == [label]
     assert csv_text(read_records(text)) == text
 
@@ -160,8 +159,8 @@ def test_a_reason_with_line_breaks_stays_on_its_row_and_a_score_named_like_a_col
 
 
 def test_published_figures_have_columns_of_their_own_beside_the_display_they_belong_to(records):
-    layout = synthetic.layout(reported_beside="leto-aged")
-    table = table_from_records(records_frame(records, layout), layout)
+    facts = synthetic.facts(beside="leto-aged")
+    table = Results(records_frame(records, facts), facts).table
     assert row_of(table, "HIL")["reported_psnr_db"] == 20.5
     assert np.isnan(row_of(table, "GS")["reported_psnr_db"])
     assert row_of(table, "HIL")["psnr_linear_db"] != 20.5
@@ -224,43 +223,42 @@ def study(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def layout(study):
-    return layout_of(study)
+def facts(study):
+    return facts_of(study)
 
 
-def test_a_layout_holds_what_the_config_orders(layout):
-    assert layout.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"), ("seeing", "ideal"))
-    assert layout.targets == tuple(f"gray {number}" for number in range(11))  # and not by the alphabet
-    assert (layout.title, layout.seed, layout.baseline, layout.headline) == ("Two methods", 7, "honest", "ssim_linear")
-    assert layout.privileged == {"knowing"}
-    assert layout.camera == {"seeing"}
-    assert [layout.category(label) for label in layout.methods] == ["open loop", "oracle", "online"]
-    assert (layout.reported_metrics, layout.reported_source) == (("psnr",), "a paper, table 3")
+def test_facts_hold_what_the_config_orders(facts):
+    assert facts.pairs == (("honest", "ideal"), ("honest", "leto-aged"), ("knowing", "leto-aged"), ("seeing", "ideal"))
+    assert list(facts.targets.index) == [f"gray {number}" for number in range(11)]  # and not by the alphabet
+    assert facts.methods["category"].to_dict() == {"honest": "open loop", "knowing": "oracle", "seeing": "online"}
+    assert facts.published_metrics == ["psnr"]
 
 
-def test_a_layout_knows_how_every_cell_of_the_plan_is_made(study, layout):
-    cells = [(label, one) for label, one in plan(study).labelled() if label in layout.methods]
+def test_facts_know_how_each_cell_of_the_plan_is_made(study, facts):
+    cells = [(label, one) for label, one in plan(study).labelled() if label in facts.methods.index]
     assert len(cells) == 44
     for label, one in cells:
-        assert layout.params[label] == one.params
-        assert layout.capture_limits.get(label) == one.captures
-        assert layout.panels[one.profile] == one.panel
-        assert layout.seed == one.seed
-    assert layout.params["seeing"] == {"value": 0.25, "pause": 0.0, "fail": ""}
-    assert (layout.study, layout.capture_limits) == ("study", {"seeing": 12})
+        row = facts.row(label, one.profile, one.condition, one.target)
+        assert facts.of(label, "params") == one.params
+        assert row["capture_limit"] == one.captures or (one.captures is None and np.isnan(row["capture_limit"]))
+        assert [row["panel_height_px"], row["panel_width_px"]] == list(one.panel)
+        assert (row["study"], row["seed"]) == ("study", one.seed)
+    assert facts.of("seeing", "params") == {"value": 0.25, "pause": 0.0, "fail": ""}
 
 
-def test_clusters_are_those_of_the_dataset_and_rows_whose_network_is_the_ideal_image_are_known(tmp_path, layout):
-    assert (layout.clusters, layout.identities) == ({}, set())
+def test_clusters_are_those_of_the_dataset_and_rows_whose_network_is_the_ideal_image_are_known(tmp_path, facts):
+    assert (facts.targets["cluster"] == facts.targets.index).all()
+    assert facts.labels("identity") == set()
     (tmp_path / "plugins.py").write_text(PLUGINS)
     crops = "targets: {dataset: crops, params: {names: [astronaut], each: 2, renderings: 1}}"
     network = '{name: hil, label: "%s", params: {network: {name: %s}}}'
     methods = f"  - {network % ('none', 'identity')}\n  - {network % ('some', 'unet')}\n"
     config = CONFIG.replace("headline:", methods + "training: {dataset: dead_leaves}\nheadline:")
     (tmp_path / "study.yaml").write_text(re.sub("targets: .*", crops, config))
-    changed = layout_of(load_study(tmp_path / "study.yaml"))
-    assert changed.clusters == {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life"}
-    assert changed.identities == {"none"}
+    changed = facts_of(load_study(tmp_path / "study.yaml"))
+    clusters = {"astronaut-1": "astronaut", "astronaut-2": "astronaut", "still-life-1": "still-life"}
+    assert changed.targets["cluster"].to_dict() == clusters
+    assert changed.labels("identity") == {"none"}
 
 
 def test_a_network_competes_by_whether_its_training_takes_photographs(tmp_path):
@@ -273,13 +271,13 @@ def test_a_network_competes_by_whether_its_training_takes_photographs(tmp_path):
     )
     config = CONFIG.replace("headline:", nets + "  - hil\ntraining: {dataset: dead_leaves}\nheadline:")
     (tmp_path / "study.yaml").write_text(config)
-    layout = layout_of(load_study(tmp_path / "study.yaml"))
-    assert [layout.category(f"{name} ideal") for name in names] == ["open loop"] * 4
-    assert [layout.category(f"{name} parametric_model") for name in names] == ["calibrated"] * 4
-    assert layout.category("hil") == "calibrated"
-    assert replace(layout, camera=frozenset()).spends_captures
-    blind = replace(layout, camera=frozenset(), trained=layout.blind)
-    assert not blind.spends_captures
+    facts = facts_of(load_study(tmp_path / "study.yaml"))
+    assert [facts.category(f"{name} ideal") for name in names] == ["open loop"] * 4
+    assert [facts.category(f"{name} parametric_model") for name in names] == ["calibrated"] * 4
+    assert facts.category("hil") == "calibrated"
+    unseen = facts.methods[facts.methods["category"] != "online"]
+    assert replace(facts, methods=unseen).spends
+    assert not replace(facts, methods=unseen[unseen["blind"]]).spends
 
 
 def test_displays_are_described_with_version_scaling_and_the_stages_that_differ_from_the_ideal(study):
@@ -327,3 +325,22 @@ def test_other_cells_than_those_that_are_planned_are_counted(tmp_path: Path) -> 
     counted = difference(frame, plan(load_study(config)))
     lost, more = "6 of 6 planned cells are not in records.csv", "14 of 14 cells in records.csv are not planned"
     assert counted == f"{lost}, {more}"
+
+
+@pytest.mark.parametrize(
+    ("cells", "photographs"),
+    [
+        ([("a", "done", 100), ("a", "done", 90), ("b", "done", 100)], 195),  # repeats of a target are averaged
+        ([("a", "done", 100), ("b", "failed", 3)], 103),
+        ([("a", "done", 100), ("a", "failed", 4)], 100),  # not their mean
+        ([("a", "failed", 4)], 4),
+        ([("a", "missing", None)], None),
+    ],
+)
+def test_photographs_of_failed_cells_count(cells, photographs):
+    records = [
+        synthetic.record("a", synthetic.cell("a", target, "bench", repeat=place), {"psnr_linear": 1.0}, state=state, captures=taken)
+        for place, (target, state, taken) in enumerate(cells)
+    ]
+    total = row_of(synthetic.results(records, baseline=None).table, "a")["total_captures"]
+    assert total == photographs or (photographs is None and np.isnan(total))

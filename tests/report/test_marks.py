@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from holobench_eval.report import Results, csv_text, read_records
-from holobench_eval.report.data.board import board
-from holobench_eval.report.data.phrases import marked, uncovered
+from holobench_eval.report.board import board
+from holobench_eval.report.phrases import marked, uncovered
 from holobench_eval.study.plan import REFERENCE
 from tests.support.synthetic_study import TARGETS, cell, record
 from tests.support.synthetic_study import results as of_records
@@ -64,7 +64,7 @@ def test_a_gray_picture_scores_the_mean_of_what_is_known_of_it() -> None:
 def test_a_fallback_stands_in_the_row_and_survives_the_file_of_records() -> None:
     found = results(20.0, 19.0, 18.0, fell_back=True)
     assert marked(found, "U-Net", DISPLAY) == "U-Net, fell back to Wirtinger"
-    again = Results(read_records(csv_text(found.frame)), found.layout)
+    again = Results(read_records(csv_text(found.frame)), found.facts)
     assert marked(again, "U-Net", DISPLAY) == "U-Net, fell back to Wirtinger"
     assert "fell_back" not in results(20.0, 19.0, 18.0).frame
 
