@@ -70,8 +70,8 @@ def write_report(
 
 def print_headline(console: Console, results: Results) -> None:
     """Print the board of every display unless there are many, in 80 columns; and what is odd about phases."""
-    from ..report.data import over_displays
     from ..report.board import board
+    from ..report.data import over_displays
     from ..report.phrases import remarks
 
     drawn = board(results)

@@ -87,7 +87,7 @@ def score_folders(
     from ..lab.dark import given_dark
     from ..report import Description, write_report
     from ..report.charts.alignment import draw_alignment
-    from ..report.facts import Layout
+    from ..report.facts import facts_of_files
     from ..study.folders.doubts import doubts
     from ..study.folders.files import read_folders
     from ..study.folders.scoring import CONDITION, Scoring, described
@@ -114,7 +114,9 @@ def score_folders(
         known = provenance.end(output, known)
         title = f"Scores of photographs: {listed(folders.methods)}"
         pairs = [(method, CONDITION) for method in folders.methods]
-        facts = facts_of_files(output.resolve().name, title, pairs, tuple(folders.targets), values, " ".join(notes), baseline)
+        facts = facts_of_files(
+            output.resolve().name, title, pairs, tuple(folders.targets), values, " ".join(notes), baseline
+        )
         given = {name: value for name, value in options.items() if value not in (None, False, "")}
         words = [word for name, value in given.items() for word in (name, *([] if value is True else [str(value)]))]
         command = shlex.join(["holoeval", "score", *words])

@@ -10,8 +10,8 @@ from typing import Any
 
 from ..core.io import write_atomically
 from ..study.definition import Study
-from .charts.look.medium import MEDIA, drawn_for
 from .board import texts
+from .charts.look.medium import MEDIA, drawn_for
 from .description import Description, describe
 from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks

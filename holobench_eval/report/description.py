@@ -19,7 +19,7 @@ from ..study.calibration.family import names as families
 from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
-from .data.text import plain, words
+from .text import plain, words
 
 PER_COLOUR = ("gamma", "gain", "width")  # of stages, where a value is a tuple
 

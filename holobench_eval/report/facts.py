@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import pandas as pd
 
@@ -29,8 +30,21 @@ CATEGORIES = OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN = "open loop", "calibr
 FLOOR = "floor"  # in files, of rows that no method made
 # Methods that, as far as is known, never see a capture of the scored image: their holograms are ready before it.
 OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)
-PLACES = {"focus": ("plane", "mm"), "views": ("place", "iris radii")}  # what a target of these measures says of its display
+PLACES = {
+    "focus": ("plane", "mm"),
+    "views": ("place", "iris radii"),
+}  # what a target of these measures says of its display
 UNCHANGED: dict[str, Any] = {"swept": "", "swept_value": math.nan, "swept_unit": "", "swept_name": ""}
+
+
+class TrainingSet(NamedTuple):
+    """What all methods of a study may train on: a dataset with its parameters, how many images it has, how many of them
+    only watch the training, and the most captures that a method may take (None: no limit)."""
+
+    dataset: str
+    images: int
+    held_out: int
+    captures: int | None
 
 
 @dataclass(frozen=True)
@@ -66,13 +80,13 @@ class Facts:
 
     methods, by label: method, title (a name for people, empty for none), params, category, trained, blind (its training
     takes no photograph), identity (its network is the ideal image itself, which has nothing to learn), stacked (it
-    receives all planes or views of a scene), tuned (on what its settings were chosen), limit (of captures for a target).
+    receives all planes or views of a scene), tuned (on what its settings were chosen), limit (of captures).
     displays, by name: panel (rows and columns [px]) and shape (of targets, (C, h, w)). targets, by name: cluster, scene
-    and place (plane [mm], or place of the eye's pupil [radii of the iris]). pairs: (label, condition) of each planned row;
-    sweeps: which conditions are changes of others; training: what methods may train on, in words (empty: nothing is
-    trained), and how many images, of them held out, and captures; network: the display that is a trained network (empty:
-    benches); beside: the condition that published figures stand beside (empty: each); profiles: of simulated displays;
-    related: facts of related studies, by their names.
+    and place (plane [mm], or place of the eye's pupil [radii of the iris]). pairs: (label, condition) of each planned
+    row; sweeps: which conditions are changes of others; training: what methods may train on (None: nothing is trained);
+    network: the display that is a trained network (empty: benches); beside: the condition that published figures stand
+    beside (empty: each); profiles: of simulated displays; related: facts of related studies, by their names; changed:
+    the conditions that are a change of another, with that change.
     """
 
     study: Study
@@ -81,7 +95,7 @@ class Facts:
     targets: pd.DataFrame
     pairs: tuple[tuple[str, str], ...]
     sweeps: tuple[Swept, ...] = ()
-    training: tuple[str, int, int, int | None] | None = None
+    training: TrainingSet | None = None
     network: str = ""
     beside: str = ""
     profiles: Mapping[str, Profile] = field(default_factory=dict)
@@ -95,7 +109,8 @@ class Facts:
 
     def of(self, label: str, name: str, unknown: Any = "") -> Any:
         """A fact of a method; ``unknown`` for a row that is not in the config."""
-        return self.methods.at[label, name] if label in self.methods.index else unknown
+        value: Any = self.methods.at[label, name] if label in self.methods.index else unknown
+        return value
 
     def labels(self, name: str) -> frozenset[str]:
         """Labels of the methods for which a fact holds."""
@@ -104,6 +119,16 @@ class Facts:
     def category(self, label: str) -> str:
         """The category that a method competes in."""
         return str(self.of(label, "category", GIVEN if self.study.measure == FILES else OPEN_LOOP))
+
+    def panel(self, display: str) -> tuple[int, int] | None:
+        """Rows and columns of the panel of a display [px]; None where they are not known."""
+        value: Any = self.displays.at[display, "panel"] if display in self.displays.index else None
+        return value
+
+    @cached_property
+    def oracles(self) -> frozenset[str]:
+        """Labels of methods that may differentiate through the bench, which are no competitors."""
+        return frozenset(label for label in self.methods.index if self.category(label) == ORACLE)
 
     @property
     def predicts(self) -> bool:
@@ -139,11 +164,15 @@ class Facts:
     def row(self, label: str, display: str, condition: str, target: str) -> dict[str, Any]:
         """The columns of a record that follow from the config."""
         change, study = self.changed.get(condition, UNCHANGED), self.study
-        if change is UNCHANGED and study.measure in PLACES and target in self.targets.index and not is_reference(condition):
+        if (
+            change is UNCHANGED
+            and study.measure in PLACES
+            and target in self.targets.index
+            and not is_reference(condition)
+        ):
             kind, unit = PLACES[study.measure]
             change = {**UNCHANGED, "swept": kind, "swept_value": self.targets.at[target, "place"], "swept_unit": unit}
-        known = display in self.displays.index
-        height, width = self.displays.at[display, "panel"] if known else (math.nan, math.nan)
+        height, width = self.panel(display) or (math.nan, math.nan)
         limit = self.of(label, "limit", math.nan)
         own = {"study": study.name, "measure": study.measure, "seed": study.seed, "capture_limit": limit}
         return {**own, "panel_height_px": height, "panel_width_px": width, **change}
@@ -218,9 +247,11 @@ def facts_of_files(
         file=Path(f"{name}.yaml"),
     )
     rows = {"cluster": targets, "scene": "", "place": math.nan}
-    known = {"category": GIVEN, "params": {}} | dict.fromkeys(("trained", "blind", "identity", "stacked"), False)
+    known: dict[str, Any] = {"category": GIVEN, "params": {}} | dict.fromkeys(
+        ("trained", "blind", "identity", "stacked"), False
+    )
     known |= {"method": "", "title": "", "tuned": None, "limit": math.nan}
-    methods = pd.DataFrame.from_dict({label: known for label in labels}, "index")
+    methods = pd.DataFrame.from_dict(dict.fromkeys(labels, known), "index")
     return Facts(study, methods, pd.DataFrame(), pd.DataFrame(rows, index=list(targets)), tuple(pairs))
 
 
@@ -257,7 +288,7 @@ def _drawn(before: Condition, points: tuple[tuple[float | str, str], ...]) -> tu
     return tuple({name: value for name, value in draw.items() if name in effective} for draw in values)
 
 
-def _training(study: Study) -> tuple[str, int, int, int | None]:
+def _training(study: Study) -> TrainingSet:
     chosen = study.training
     images = plugins.build("datasets", chosen.dataset, dict(chosen.params), study.folder).items()
-    return f"{chosen.dataset} ({plain(chosen.params)})", len(images), chosen.held_out, chosen.captures
+    return TrainingSet(f"{chosen.dataset} ({plain(chosen.params)})", len(images), chosen.held_out, chosen.captures)

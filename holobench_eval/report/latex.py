@@ -149,8 +149,7 @@ def _counts_captures(results: Results, condition: str) -> bool:
 
 def _caption(results: Results, condition: str) -> Iterator[str]:
     """What was measured, on what, over what, and what the signs mean."""
-    score, ssim, known = results.headline, _ssim(results), results.facts.displays
-    size = known.at[condition, "panel"] if condition in known.index else None
+    score, ssim, size = results.headline, _ssim(results), results.facts.panel(condition)
     display = f"{_what(results)}{f', panel {size[0]} x {size[1]} pixels' if size else ''}"
     same = ssim is not None and ssim.domain == score.domain
     names = [score.title if same else _named(score), *([_named(ssim)] if ssim else [])]

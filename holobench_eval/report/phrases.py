@@ -120,7 +120,11 @@ def edited(records: Sequence[Mapping[str, Any]]) -> str:
 def too_few(results: Results) -> str:
     """That no test of two methods can show anything on so few clusters; empty where one can, and without any test."""
     rivals = max(
-        (len({*results.methods(name)} - {*[label for label in results.labels if results.category(label) == ORACLE]}) for name in results.conditions), default=0
+        (
+            len({*results.methods(name)} - {*[label for label in results.labels if results.category(label) == ORACLE]})
+            for name in results.conditions
+        ),
+        default=0,
     )
     clusters = len(set(results.clusters))
     smallest = 2.0 ** (1 - clusters)

@@ -1,8 +1,8 @@
 """The numbers of a study: one frame of records, from which each file, page and chart takes what it shows.
 
 Frames have the columns of ``columns``. Numbers are rounded to six significant digits once, when records become a frame;
-all that comes after is computed from the rounded numbers. So table.csv computed from a records.csv that was read back has
-the same bytes.
+all that comes after is computed from the rounded numbers. So table.csv computed from a records.csv that was read back
+has the same bytes.
 """
 
 from __future__ import annotations
@@ -61,7 +61,9 @@ def records_frame(records: Iterable[Record], facts: Facts) -> pd.DataFrame:
     # Without any score the headline still has its column, empty, so that the holes have a table to show in.
     scores = order_scores(score_columns(frame)) or [parse(facts.study.headline).column]
     kept = {name for name, column in RECORDED.items() if name in frame and _is_kept(column, frame, facts)}
-    first, last = ([column.name for column in part if column.source and column.name in kept] for part in (BEFORE, AFTER))
+    first, last = (
+        [column.name for column in part if column.source and column.name in kept] for part in (BEFORE, AFTER)
+    )
     return _sorted(_whole(frame.reindex(columns=[*first, *scores, *last])), facts)
 
 
@@ -153,6 +155,11 @@ def _sorted(frame: pd.DataFrame, facts: Facts) -> pd.DataFrame:
     places = frame.assign(_row=[rank[pair] for pair in pairs], _target=frame["target"].map(targets))
     ordered = places.sort_values(["_row", "_target", "target", "repeat", "cell"], kind="stable")
     return ordered.drop(columns=["_row", "_target"]).reset_index(drop=True)
+
+
+def clusters_in(frame: pd.DataFrame) -> dict[str, str]:
+    """The cluster of each target of a records frame."""
+    return dict(zip(frame["target"], frame["cluster"], strict=True))
 
 
 def score_columns(frame: pd.DataFrame) -> list[str]:
@@ -322,7 +329,7 @@ class Results:
     @cached_property
     def clusters(self) -> NDArray[np.str_]:
         """``(targets,)`` names: targets of one cluster, such as crops of one photograph, are not independent."""
-        known = dict(zip(self.frame["target"], self.frame["cluster"], strict=True))
+        known = clusters_in(self.frame)
         return np.array([known.get(target, target) for target in self.targets])
 
     @cached_property
@@ -414,7 +421,8 @@ class Results:
     def shape(self, reference: str) -> tuple[int, ...]:
         """Of the targets of some reference rows, as displays are to show them; none for pictures from files."""
         name, known = self.display_of.get(reference, reference), self.facts.displays
-        return known.at[name, "shape"] if name in known.index else ()
+        shape: Any = known.at[name, "shape"] if name in known.index else ()
+        return shape
 
     def has_pictures(self, condition: str) -> bool:
         """Whether the reference rows were scored against the same images as the methods under ``condition``, and made
@@ -434,7 +442,7 @@ class Results:
 
     @cached_property
     def tests(self) -> dict[tuple[str, str], PairedTest]:
-        """Each method against the baseline on each display, by (label, condition): one family, in which no oracle is."""
+        """Each method against the baseline on each display, by (label, condition): one family, without oracles."""
         baseline = self.baseline
         rows = [
             (label, condition, self.values(label, condition) - self.values(baseline, condition))
@@ -462,10 +470,10 @@ class Results:
         """The frame of table.csv, a row per method and condition: means over targets with 95 % intervals over clusters.
 
         ``n`` counts targets with at least one done cell, ``clusters`` their clusters, and ``failed`` counts cells
-        without a score. The headline has a median over targets, too. A metric that only some of the ``n`` targets have is
-        left empty, so that its mean always stands for the ``n`` beside it; figures that describe the capture, such as
-        the speckle contrast of flat patches, are means over the targets that have them. Only rows with each target are
-        ranked, and neither oracle nor floor; equal means share the better place.
+        without a score. The headline has a median over targets, too. A metric that only some of the ``n`` targets have
+        is left empty, so that its mean always stands for the ``n`` beside it; figures that describe the capture, such
+        as the speckle contrast of flat patches, are means over the targets that have them. Only rows with each target
+        are ranked, and neither oracle nor floor; equal means share the better place.
         """
         rows, score = pd.DataFrame([self._row(*pair) for pair in self.cells]), parse(self.study.headline)
         if score.column in rows:

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from .charts.tiles import Thumbnails
-from .data.layout import Layout
 from .data.ranks import Ranks, ranks
-from .data.results import Results
 from .data.sweeps import Sweep, sweeps
 from .data.trainings import Training, trainings
 from .description import Description
 from .markdown import Markdown, captions
+from .results import Results
 
 Blocks = Iterable[object]  # what `markdown.blocks` takes
 Figures = Sequence[Markdown]
@@ -50,11 +49,6 @@ class Report:
         return [(path, text) for path, text in known if fnmatch(path.name, pattern) and path.is_file()]
 
     @property
-    def layout(self) -> Layout:
-        """The rows of the study's tables."""
-        return self.results.layout
-
-    @property
     def figures(self) -> Path:
         """The folder of the figures."""
         return self.drawn or self.output / "figures"
@@ -67,7 +61,7 @@ class Report:
     @cached_property
     def trainings(self) -> list[Training]:
         """Everything that the study had to learn."""
-        return trainings(self.layout, self.records, self.output)
+        return trainings(self.results.facts, self.records, self.output)
 
     @cached_property
     def sweeps(self) -> list[Sweep]:

@@ -23,10 +23,10 @@ from ..study.calibration.twin import Photographed, trial_names
 from ..study.plan import Cell
 from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
-from .data.statistics import Estimate, mean_interval
 from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
 from .sections.diagnosis import quantities
+from .statistics import Estimate, mean_interval
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"

@@ -138,7 +138,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     report = tmp_path / "reports" / "leaderboard"
     report.mkdir(parents=True)
     records = read_records((ROOT / "reports" / "leaderboard" / "records.csv").read_text())
-    write_files(Results(records, facts_of(load_study(ROOT / "configs" / "leaderboard.yaml"))), report)
+    for name, text in texts(Results(records, facts_of(load_study(ROOT / "configs" / "leaderboard.yaml")))).items():
+        (report / name).write_text(text)
     monkeypatch.chdir(tmp_path)
     return report
 

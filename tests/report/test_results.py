@@ -22,9 +22,9 @@ from holobench_eval.report import (
     recompute_files,
     records_frame,
 )
+from holobench_eval.report.description import describe
 from holobench_eval.report.scores import order_scores, parse
 from holobench_eval.report.statistics import Estimate
-from holobench_eval.report.description import describe
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import FLOORS, REFERENCE, plan
 from tests.study.studies import compute
@@ -339,7 +339,9 @@ def test_other_cells_than_those_that_are_planned_are_counted(tmp_path: Path) -> 
 )
 def test_photographs_of_failed_cells_count(cells, photographs):
     records = [
-        synthetic.record("a", synthetic.cell("a", target, "bench", repeat=place), {"psnr_linear": 1.0}, state=state, captures=taken)
+        synthetic.record(
+            "a", synthetic.cell("a", target, "bench", repeat=place), {"psnr_linear": 1.0}, state=state, captures=taken
+        )
         for place, (target, state, taken) in enumerate(cells)
     ]
     total = row_of(synthetic.results(records, baseline=None).table, "a")["total_captures"]

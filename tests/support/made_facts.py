@@ -71,11 +71,16 @@ def facts(
         }
         for label in labels
     }
-    shown = {name: {"panel": (panels or {}).get(name), "shape": (shapes or {}).get(name, ())} for name in {**(panels or {}), **(shapes or {})}}
+    shown = {
+        name: {"panel": (panels or {}).get(name), "shape": (shapes or {}).get(name, ())}
+        for name in {**(panels or {}), **(shapes or {})}
+    }
     places = [((clusters or {}).get(name, name), *(planes or {}).get(name, ("", math.nan))) for name in targets]
     return Facts(
         described,
-        pd.DataFrame.from_dict(rows, "index") if rows else pd.DataFrame(columns=["category", "trained", "blind", "identity", "stacked", "tuned"]),
+        pd.DataFrame.from_dict(rows, "index")
+        if rows
+        else pd.DataFrame(columns=["category", "trained", "blind", "identity", "stacked", "tuned"]),
         pd.DataFrame.from_dict(shown, "index"),
         pd.DataFrame(places, columns=["cluster", "scene", "place"], index=list(targets)),
         pairs,

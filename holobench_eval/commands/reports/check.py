@@ -66,8 +66,8 @@ def kept_in(folder: Path, seed: int) -> list[str]:
     whose record, or whose row of records.csv, has another score."""
     from ...core.seeds import seed as seed_of
     from ...report import read_records, records_text
-    from ...report.scores import parse
     from ...report.results import score_columns
+    from ...report.scores import parse
     from ...study.plan import plan
     from ...study.scoring.job import Job, Setting
     from ...study.scoring.picture import verified

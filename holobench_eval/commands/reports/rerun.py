@@ -214,8 +214,8 @@ def _judge(
 ) -> None:
     """Count the numbers of the chosen cells that are reproduced, and note the others."""
     from ...metrics.protocol import VERSION as PROTOCOL
-    from ...report.scores import parse
     from ...report.results import DONE, rounded
+    from ...report.scores import parse
 
     others = sum(each.cell.id != each.row["cell"] for each in chosen)
     if others:

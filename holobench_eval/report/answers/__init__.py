@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..data.results import Results
+from ..results import Results
 from . import ablation, budget, comparison, error_budget, focus, over_displays, prediction, ranks, sweeps
 from .kind import Kind
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..data.board import GROUPS, Board, Display, Row
-from ..data.layout import ORACLE
-from ..data.phrases import verdict
-from ..data.text import FILES, grouped, number, words
+from ..board import GROUPS, Board, Display, Row
+from ..facts import ORACLE
 from ..markdown import Markdown, blocks, code, escape, heading, table_of
+from ..phrases import verdict
+from ..text import FILES, grouped, number, words
 
 SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
 
@@ -35,20 +35,20 @@ def display_table(board: Board, display: Display) -> Markdown | None:
 
 
 def _line(board: Board, row: Row, group: str, has_panel_time: bool) -> dict[str, object]:
-    score, layout = board.results.headline, board.results.layout
-    title, name = layout.titles.get(row.label), code(row.label)
+    score, results = board.results.headline, board.results
+    title, name = results.facts.of(row.label, "title"), code(row.label)
     named = Markdown(", ").join([Markdown("{} ({})").format(title, name) if title else row.label, *board.marks(row)])
     line: dict[str, object] = {"": row.tier, "method": named, score.heading: score.number(row.score.mean)}
-    if layout.baseline:
-        against = "baseline" if row.label == layout.baseline else "–"
+    if results.baseline:
+        against = "baseline" if row.label == results.baseline else "–"
         if row.test:
             sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
             against = f"{score.estimate(row.test.estimate, signed=True)}{sign}"
-        line[f"against {layout.baseline}{score.brackets}"] = against
+        line[f"against {results.baseline}{score.brackets}"] = against
     line |= {each.title: each.number(value) for each, value in zip(board.beside, row.beside, strict=True)}
-    costs = {"photographs": row.photographs} if layout.spends_captures else {}
+    costs = {"photographs": row.photographs} if results.facts.spends else {}
     costs |= {"panel time [frames]": row.panel_time} if has_panel_time else {}
-    costs |= {"seconds": row.seconds, "memory [MiB]": row.memory} if layout.measure != FILES else {}
+    costs |= {"seconds": row.seconds, "memory [MiB]": row.memory} if results.study.measure != FILES else {}
     return line | {cost: number(value) for cost, value in costs.items()}
 
 

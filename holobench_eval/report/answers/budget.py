@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.layout import OFFLINE, ONLINE
-from ..data.phrases import tested, value, verdict
-from ..data.results import Results
-from ..data.text import grouped, number, words
+from ..facts import OFFLINE, ONLINE
+from ..phrases import value, verdict
+from ..results import Results
+from ..text import grouped, number, words
 from .kind import Kind
 
 
 def families(results: Results, condition: str) -> dict[str, list[str]]:
     """Rows of a display by registered method, of methods with rows of different captures in total, fewest first."""
-    rows = [label for label in results.methods(condition) if label not in results.layout.privileged]
+    rows = [label for label in results.methods(condition) if label not in results.facts.oracles]
     found = grouped((str(results.names[label]), label) for label in rows if results.is_complete(label, condition))
     return {
         name: sorted(labels, key=lambda label: _captures(results, label, condition))
@@ -23,14 +23,14 @@ def families(results: Results, condition: str) -> dict[str, list[str]]:
 
 
 def _captures(results: Results, label: str, condition: str) -> float:
-    return float(results.row(label, condition)["total_captures"])
+    return float(results.rows[label, condition]["total_captures"])
 
 
 def _applies(results: Results) -> bool:
-    if not results.conditions or not results.layout.spends_captures or "total_captures" not in results.table:
+    if not results.conditions or not results.facts.spends or "total_captures" not in results.table:
         return False
     first = results.conditions[0]
-    if not results.layout.baseline or not results.is_complete(results.layout.baseline, first):
+    if not results.baseline or not results.is_complete(results.baseline, first):
         return False
     return 2 * sum(map(len, families(results, first).values())) > len(results.methods(first))
 
@@ -44,9 +44,9 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def _of(results: Results, condition: str, found: dict[str, list[str]]) -> str:
-    passed, failed, baseline = list[tuple[float, str]](), list[str](), results.layout.baseline
+    passed, failed, baseline = list[tuple[float, str]](), list[str](), results.baseline
     for name, labels in found.items():
-        tests = [(label, tested(results, label, condition)) for label in labels]
+        tests = [(label, results.tested(label, condition)) for label in labels]
         beats = [label for label, test in tests if test and verdict(results.headline, test) == "better"]
         if beats:
             cost = _captures(results, beats[0], condition)

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...core.errors import listed
 from ...study.folders.files import remedies
-from ..data.board import Display, Row, board
-from ..data.layout import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..board import Display, Row, board
 from ..data.over_displays import published
-from ..data.phrases import difference, verdict
-from ..data.results import Results
-from ..data.text import FILES, number, words
+from ..facts import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..phrases import difference, verdict
+from ..results import Results
+from ..text import FILES, number, words
 from .kind import Kind, subjects
 
 NAMED = 3  # methods of one letter
@@ -55,7 +55,7 @@ def of_display(results: Results, display: Display, begin: str = "") -> str:
             said = "" if margin is None else f" (published {results.headline.with_unit(margin, signed=True)})"
             parts.append(f"{row.label} {against(results, row)}{said}")
     text = f"{begin}{'; '.join(parts)}." if parts else ""
-    return text.replace(OTHER, f" against {results.layout.baseline}", 1).replace(OTHER, "")
+    return text.replace(OTHER, f" against {results.baseline}", 1).replace(OTHER, "")
 
 
 def _among(results: Results, rivals: list[Row]) -> str:
@@ -63,7 +63,7 @@ def _among(results: Results, rivals: list[Row]) -> str:
     test = rivals[0].test if rivals else None
     if test is None or not results.headline.better(0.0, test.estimate.mean):
         return ""
-    knows = results.layout.category(test.first) == ORACLE
+    knows = results.category(test.first) == ORACLE
     return "without knowing the display " if knows else "without photographs of the picture itself "
 
 
@@ -91,7 +91,7 @@ KIND = Kind(
 # Paper Table 2: how well does a method exploit the network that stands for the display?
 ON_A_NETWORK = Kind(
     question="How good are the pictures that the learned display predicts?",
-    applies=lambda results: results.layout.learned_display is not None and results.layout.measure == "picture",
+    applies=lambda results: results.facts.network and results.study.measure == "picture",
     verdicts=verdicts,
 )
 
@@ -113,7 +113,7 @@ def lacking(results: Results) -> str:
         said = f"Only the {have} ranked"
     else:
         said = "No method is ranked, since none has every target"
-    common = _in_common(results, lacks) if results.layout.measure == FILES else ""
+    common = _in_common(results, lacks) if results.study.measure == FILES else ""
     return f"{said}: {_first(who, LISTED)}. {_remedy(results, lacks)}{common}"
 
 
@@ -121,7 +121,7 @@ def _in_common(results: Results, lacks: Lacks) -> str:
     """How given photographs of two methods differ on the targets that both have, where one of them lacks some."""
     display, total = results.conditions[0], len(results.targets)
     labels = sorted(results.methods(display), key=lambda label: (label, display) in lacks)
-    first = results.layout.baseline or labels[0]
+    first = results.baseline or labels[0]
     told = []
     for label in labels:
         if label != first and {(label, display), (first, display)} & lacks.keys():
@@ -141,7 +141,7 @@ def _remedy(results: Results, lacks: Lacks) -> str:
     some = [names for names in lacks.values() if len(names) < len(results.targets)]
     away = [name for name in results.targets if any(name in names for names in some)]
     left, who = len(results.targets) - len(away), "all" if len(some) == len(lacks) else "all that have any score"
-    if results.layout.measure == FILES:
+    if results.study.measure == FILES:
         holes = results.holes[["state", "label", "target", "reason"]].itertuples(index=False, name=None)
         way = remedies((str(state), str(method), str(target), str(reason)) for state, method, target, reason in holes)
         moved = f"move the targets and captures of {_first(away, LISTED)} away"

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..data.board import Board
+from ..board import Board
 from ..data.error_budget import Budget, Part, budgets
 from ..data.over_displays import is_many
-from ..data.results import Results
-from ..data.scores import Score
-from ..data.statistics import Array
-from ..data.text import bracketed, percent, words
 from ..markdown import Markdown, table_of
+from ..results import Results
+from ..scores import Score
+from ..statistics import Array
+from ..text import bracketed, percent, words
 from .kind import Kind
 
 
@@ -77,12 +77,12 @@ def rows(board: Board) -> Markdown | None:
 
 def _control(results: Results, score: Score, part: Part, condition: str) -> str:
     is_model = part.label in results.methods(condition)
-    return score.in_row(results.row(part.label, condition)) if is_model else "–"
+    return score.in_row(results.rows[part.label, condition]) if is_model else "–"
 
 
 KIND = Kind(
     question="Where does the error of the captures come from, and who can remove it?",
-    applies=lambda results: results.layout.measure == "error_budget",
+    applies=lambda results: results.study.measure == "error_budget",
     verdicts=verdicts,
     table=rows,
     limits=(

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from ..data.board import Board
-from ..data.results import Results
-from ..data.text import words
+from ..board import Board
 from ..markdown import Markdown
+from ..results import Results
+from ..text import words
 from .board import board_table
 
 MOST_WORDS = 40  # of a verdict
@@ -35,7 +35,7 @@ class Kind:
         if not results.conditions or results.done.empty:
             return ["No cell of the study has a score, so there is no answer."]
         found = [verdict for verdict in self.verdicts(results) if verdict]
-        told = mentioned(results.layout.methods, " ".join(found))
+        told = mentioned(results.labels, " ".join(found))
         if untold := [label for label in subjects(results) if label not in told]:
             found[:0] = [f"Nothing is said of {words(untold)}: a score is missing, of a target or of the baseline."]
         return found or ["Too many scores are missing for an answer."]
@@ -43,9 +43,8 @@ class Kind:
 
 def subjects(results: Results) -> list[str]:
     """The methods that the question names, in its order, without baseline and oracles: those it is about."""
-    layout = results.layout
-    aside = {layout.baseline, *layout.privileged}
-    return [label for label in mentioned(layout.methods, layout.question) if label not in aside]
+    aside = {results.baseline, *results.facts.oracles}
+    return [label for label in mentioned(results.labels, results.study.question) if label not in aside]
 
 
 def mentioned(names: Iterable[str], text: str) -> list[str]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..data.layout import FLOOR
-from ..data.phrases import edited, remarks, too_few, uncovered
-from ..data.statistics import FEWEST, SIGNIFICANCE
-from ..data.text import FILES, grouped, words
+from ..facts import FLOOR
 from ..markdown import Markdown
+from ..phrases import edited, remarks, too_few, uncovered
 from ..section import Report
+from ..statistics import FEWEST, SIGNIFICANCE
+from ..text import FILES, grouped, words
 from .kind import Kind, subjects
 
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
@@ -22,9 +22,10 @@ FIRST = 5  # that stand in report.md; the others are in details.md
 def limits(report: Report, kind: Kind) -> list[Markdown]:
     """The items of the list, each with its name in bold, what matters most first."""
     texts = [*remarks(report.results), *_sample(report), *_form(report), *kind.limits, *_displays(report)]
-    texts += [f"Measured: {report.layout.text.caution}"] * bool(report.layout.text.caution)
-    texts += [f"Published: {report.layout.reported_source}."] * bool(report.layout.reported_source)
-    texts += [f"Note: {report.layout.note}"] * bool(report.layout.note)
+    texts += [f"Measured: {report.results.text.caution}"] * bool(report.results.text.caution)
+    reported = report.results.study.reported
+    texts += [f"Published: {reported.source}."] if reported else []
+    texts += [f"Note: {report.results.study.note}"] * bool(report.results.study.note)
     texts += [text for text in (uncovered(report.records), edited(report.records)) if text]
     texts += [*_weights(report), *_tuned(report), *_seconds(report), *_lpips(report)]
     found = []
@@ -43,13 +44,13 @@ def _sample(report: Report) -> Iterator[str]:
         f"{targets} target{'s' * (targets != 1)}{among}; brackets are of how a mean varies with other pictures of the "
         f"kind, not with other displays{trained}."
     ]
-    tests = sum(np.isfinite(test.p) for test in results.against_baseline)
+    tests = sum(np.isfinite(test.p) for test in results.tests.values())
     if few := too_few(results):
         parts.append(few)
     elif tests:
         parts.append(
             f"Shown: p < {SIGNIFICANCE} by sign flips, adjusted for {tests} comparison{'s' * int(tests > 1)} with "
-            f"{results.layout.baseline}; not shown does not mean that there is none."
+            f"{results.baseline}; not shown does not mean that there is none."
         )
     elif clusters < FEWEST:
         parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
@@ -65,7 +66,7 @@ def _displays(report: Report) -> Iterator[str]:
         yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
     for label, model in report.description.models.items():
         yield f"{label}: descends through {model}."
-    if report.layout.measure == FILES:
+    if report.results.study.measure == FILES:
         yield "Display: real, and known from its photographs alone."
 
 
@@ -85,7 +86,7 @@ def _form(report: Report) -> Iterator[str]:
 
 
 def _tuned(report: Report) -> Iterator[str]:
-    same = grouped((text, label) for label, text in report.layout.tuned.items())
+    same = grouped((text, label) for label, text in report.results.facts.methods["tuned"].dropna().items())
     parts = [f"of {words(labels)}, {text}" for text, labels in same.items()]
     if parts:
         others = "The others have the settings of their papers, of this package or of the config."
@@ -117,7 +118,7 @@ def _seconds(report: Report) -> Iterator[str]:
 
 def _lpips(report: Report) -> Iterator[str]:
     """Why LPIPS is missing where it was wanted, and how to have it."""
-    metrics, wanted = {score.metric for score in report.results.scores}, report.layout.metrics
+    metrics, wanted = {score.metric for score in report.results.scores}, report.results.study.protocol.metrics
     has = any(name.startswith("lpips") for name in metrics)
     if not has and (wanted is None or any(name.startswith("lpips") for name in wanted)):
         yield (

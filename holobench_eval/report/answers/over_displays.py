@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..board import Board
 from ..data import over_displays as over
-from ..data.board import Board
-from ..data.results import Results
-from ..data.statistics import cause
-from ..data.text import words
 from ..markdown import Markdown, table_of
+from ..results import Results
+from ..statistics import cause
+from ..text import words
 from .kind import Kind, subjects
 
 MOST = 2  # methods that the answer names beside those of the question
@@ -40,7 +40,7 @@ def _told(results: Results, each: over.Margin, count: int) -> str:
     score, (low, high) = results.headline, each.spread
     worse = f" and loses on {each.worse}" if each.worse else ""
     return (
-        f"{each.label} beats {results.layout.baseline} on {each.better} of {count} displays{worse}: "
+        f"{each.label} beats {results.baseline} on {each.better} of {count} displays{worse}: "
         f"median {score.with_unit(each.median, signed=True)}, {score.number(low, signed=True)} to "
         f"{score.number(high, signed=True)} on nine in ten"
     )
@@ -74,7 +74,7 @@ def _map(results: Results) -> Iterator[str]:
                 f"the best method on {found.hits} of {count} displays left out and costs {behind}."
             )
     yield f"{usual} is best on {best[usual]} of {count}."
-    asked = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.layout.baseline]
+    asked = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
     if found and (shares := [f"{max(found.explained(label), 0):.2f} of {label}" for label in asked]):
         yield (
             f"Its parts ({found.axes[0]}; {found.axes[1]}) predict margins on displays left out: R2 {words(shares)}."

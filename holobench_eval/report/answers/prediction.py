@@ -13,12 +13,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...metrics.control import MOST
-from ..data.board import Board
+from ..board import Board
 from ..data.over_displays import is_many
-from ..data.phrases import tested, value, verdict
-from ..data.results import Results
-from ..data.text import grouped, words
 from ..markdown import Markdown, table
+from ..phrases import value, verdict
+from ..results import Results
+from ..text import grouped, words
 from .board import board_table
 from .kind import Kind, subjects
 
@@ -46,18 +46,22 @@ def _controls(results: Results, condition: str) -> Iterator[str]:
 
 def _named(results: Results, condition: str) -> Iterator[str]:
     """Which networks of the question beat the baseline."""
-    tests = [test for label in subjects(results) if (test := tested(results, label, condition))]
+    tests = [test for label in subjects(results) if (test := results.tested(label, condition))]
     groups = grouped((verdict(results.headline, test), test.second) for test in tests)
     parts = [f"{name}: {words(labels)}" for name, labels in groups.items()]
     if parts:
-        yield f"than {results.layout.baseline}, {', '.join(parts)}"
+        yield f"than {results.baseline}, {', '.join(parts)}"
 
 
 def _reported(results: Results, condition: str) -> Iterator[str]:
     """The place of the row that was published as the first."""
-    published = {label: row["psnr"] for label, row in results.layout.reported.items() if "psnr" in row}
+    published = {
+        label: row["psnr"]
+        for label, row in (results.study.reported.rows if results.study.reported else {}).items()
+        if "psnr" in row
+    }
     ranked = [label for label in results.ranking(condition) if label in published]
-    if len(ranked) > 1 and condition == (results.layout.reported_beside or condition):
+    if len(ranked) > 1 and condition == (results.facts.beside or condition):
         first = max(ranked, key=lambda label: published[label])
         yield f"{first}, published as first of {len(ranked)}, is number {ranked.index(first) + 1}"
 
@@ -79,7 +83,7 @@ def _over_many(results: Results) -> Markdown:
     """A row a method: every score's mean over the displays, and its range over them."""
     scores = [results.headline, *results.control]
     lines = []
-    for label in results.layout.methods:
+    for label in results.labels:
         cells = [label]
         for score in scores:
             means = [results.values(label, name, score.key).mean() for name in results.conditions]
@@ -98,7 +102,7 @@ def rows(board: Board) -> Markdown | None:
 
 KIND = Kind(
     question="Which network predicts the captures of the display best?",
-    applies=lambda results: results.layout.measure == "prediction",
+    applies=lambda results: results.study.measure == "prediction",
     verdicts=verdicts,
     table=rows,
     limits=("Training: one short training of each network; the order after longer ones may be another.",),

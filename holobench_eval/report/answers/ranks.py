@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..data.board import Board
+from ..board import Board
 from ..data.ranks import Ranks, ranks
-from ..data.results import Results
-from ..data.text import bracketed, percent, words
 from ..markdown import Markdown, table_of
+from ..results import Results
+from ..text import bracketed, percent, words
 from .kind import Kind
 
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator
 
 from ...study.definition import Claim
-from ..data.board import Board, is_gray
-from ..data.layout import OFFLINE, ONLINE
-from ..data.phrases import difference
-from ..data.results import Results
+from ..board import Board, is_gray
 from ..data.sweeps import SMALL, Sweep, sweeps
-from ..data.text import grouped, percent, words
+from ..facts import OFFLINE, ONLINE
 from ..markdown import Markdown, table_of
+from ..phrases import difference
+from ..results import Results
+from ..text import grouped, percent, words
 from .kind import Kind, subjects
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
@@ -45,7 +45,7 @@ def _followed(results: Results, before: str) -> list[str]:
     Where that is the baseline alone, also the next.
     """
     ranked = [results.ranking(before, categories=categories) for categories in (OFFLINE, (ONLINE,))]
-    best, baseline = (ranked[0] or ranked[1])[:1], results.layout.baseline
+    best, baseline = (ranked[0] or ranked[1])[:1], results.baseline
     followed = list(dict.fromkeys([*subjects(results), *best]))
     others = [label for label in (*ranked[0], *ranked[1]) if label != baseline]
     return [*followed, *others[:1]] if followed == [baseline] else followed
@@ -59,7 +59,7 @@ def _costs(here: list[Sweep], label: str) -> Iterator[str]:
     loss, sweep, value = max(losses, key=lambda entry: entry[0].mean)
     score, before = sweep.results.headline, sweep.swept.before
     cost = f"{label} loses at most {difference(score, loss)} ({sweep.kind.words}, {sweep.text(value)})"
-    lead, baseline = sweep.gain(label, before), sweep.results.layout.baseline
+    lead, baseline = sweep.gain(label, before), sweep.results.baseline
     if lead is None or label == baseline:
         yield cost
     elif lead.mean <= 0:
@@ -75,7 +75,7 @@ def _seen(here: list[Sweep]) -> Iterator[str]:
     """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
     for sweep in (sweep for sweep in here if sweep.swept.kind == "eye_pupil"):
         results, score, parts = sweep.results, sweep.results.headline, list[str]()
-        baseline = str(results.layout.baseline)
+        baseline = str(results.baseline)
         for place, name in sweep.swept.points:
             rivals = [label for label in sweep.methods if label != baseline]
             gains = {label: gain for label in rivals if (gain := sweep.gain(label, name)) is not None}
@@ -103,7 +103,7 @@ def _ranges(here: list[Sweep]) -> Iterator[str]:
 
 def _recovered(results: Results, here: list[Sweep]) -> Iterator[str]:
     """What share of a loss of the baseline each remedy gets back, from the worst to the best value."""
-    baseline, kinds = str(results.layout.baseline), {sweep.swept.kind: sweep for sweep in here}
+    baseline, kinds = str(results.baseline), {sweep.swept.kind: sweep for sweep in here}
     for kind, remedies in REMEDIES.items():
         sweep = kinds.get(kind)
         for remedy in (kinds[name] for name in remedies if name in kinds and sweep):
@@ -134,15 +134,15 @@ def _claim(sweep: Sweep, label: str, claim: Claim) -> str:
 def rows(board: Board) -> Markdown | None:
     """A row a change and method: the worst value, the loss there, and what is left above the baseline."""
     results, lines = board.results, []
-    score, baseline = results.headline, results.layout.baseline
+    score, baseline = results.headline, results.baseline
     for sweep in sweeps(results):
         for label in sweep.methods:
             if (worst := sweep.worst(label)) is None:
                 continue
             value, loss = worst
-            online = ", solves after the change" * (results.layout.category(label) == ONLINE)
+            online = ", solves after the change" * (results.category(label) == ONLINE)
             line = {"change": sweep.kind.words, "display": sweep.swept.before}
-            line |= {"method": f"{results.layout.marked(label)}{online}", "worst at": sweep.text(value)}
+            line |= {"method": f"{results.facts.marked(label)}{online}", "worst at": sweep.text(value)}
             line |= {f"mean loss there{score.brackets}": score.estimate(loss, signed=True)}
             if baseline:
                 gained = sweep.gain(label, dict(sweep.swept.points)[value]) if label != baseline else None

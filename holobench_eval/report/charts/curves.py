@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from ...study.artifacts import Round
-from ..data.board import Display, Row
-from ..data.layout import ORACLE
+from ..board import Display, Row
 from ..data.sweeps import Sweep
+from ..facts import ORACLE
 from .look.medium import medium
 from .look.methods import Look, looks
 from .style import GREY, SHADES, grid, laid_out, legend_below, marks, save, stacked, style, without_math
@@ -117,7 +117,7 @@ def _draw_sweep(axes: Axes, sweep: Sweep) -> None:
             color=looked[label].colour,
             **marks(looked[label], 6.5),
             linewidth=1.5 if kind.numeric else 0,
-            linestyle="--" if label == results.layout.baseline else "-",
+            linestyle="--" if label == results.baseline else "-",
             elinewidth=0.8,
             capsize=2,
             label=label,

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..data import over_displays
-from ..data.results import Results
-from ..data.scores import Score
-from ..data.statistics import Array, Estimate
+from ..results import Results
+from ..scores import Score
+from ..statistics import Array, Estimate
 from .look.medium import medium
 from .look.methods import Look, looks
 from .style import GREY, grid, legend_below, marks, note, save, slugs, stacked, style
@@ -45,15 +45,15 @@ def draw(results: Results, condition: str, path: Path) -> str:
     Intervals are those of the paired tests, over clusters of targets (``data.statistics``). The dashed line is the
     constant image, at its mean difference to the baseline.
     """
-    baseline, score = results.layout.baseline, results.headline
+    baseline, score = results.baseline, results.headline
     assert baseline is not None
     floor = results.floor(condition, less=results.values(baseline, condition))
     lines = {} if floor is None else {"floor: a constant image": floor}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
     return (
-        f"{results.headline.axis}{results.layout.text.axis}, on {condition}: differences to the baseline "
-        f"{results.layout.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
+        f"{results.headline.axis}{results.text.axis}, on {condition}: differences to the baseline "
+        f"{results.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
         "their 95 % intervals over clusters of targets, not adjusted for the number of comparisons."
     )
 
@@ -66,16 +66,16 @@ def draw_over_displays(results: Results, path: Path) -> str:
     lines = {f"published for {label}": value for label, value in known.items() if value is not None}
     _draw(results, path, f"{len(over_displays.shown_on(results))} displays", rows, lines)
     return (
-        f"Differences to {results.layout.baseline} in {results.headline.axis}. Small dots: displays, at the same "
+        f"Differences to {results.baseline} in {results.headline.axis}. Small dots: displays, at the same "
         "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets."
     )
 
 
 def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
     """Rows of differences to the baseline, which is a line at zero; further lines are dashed."""
-    baseline, score = results.layout.baseline, results.headline
+    baseline, score = results.baseline, results.headline
     better = "right" if score.higher_is_better else "left"
-    axis = f"difference to {baseline} in {score.axis}{results.layout.text.axis}; better: to the {better}"
+    axis = f"difference to {baseline} in {score.axis}{results.text.axis}; better: to the {better}"
     axis = medium().wrap(axis, 0.6 * medium().width)
     labels = [f"baseline: {baseline}"]
     labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
@@ -97,10 +97,10 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
 def _rows(results: Results, condition: str) -> Iterator[Row]:
     """A row for every method but the baseline; how many targets have no difference stands in its name."""
     looked = looks(results.names)
-    for test in results.against_baseline if results.layout.baseline else ():
+    for test in results.tests.values() if results.baseline else ():
         if test.condition != condition or not test.estimate.n:
             continue
-        name = results.layout.marked(test.second)
+        name = results.facts.marked(test.second)
         if test.estimate.n < len(results.targets):
             name = f"{name}, {test.estimate.n} of {len(results.targets)} targets"
         yield Row(name, test.differences, test.estimate, looked[test.second])

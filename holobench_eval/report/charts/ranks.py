@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from ..data.ranks import Ranks
-from ..data.text import bracketed
+from ..text import bracketed
 from .look.medium import medium
 from .style import GREY, PALE, grid, new_figure, save, style
 

@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from ...core.errors import PictureError
 from ...core.pictures import open_picture
 from ...study.store import Store
-from ..data.results import Results
-from ..data.scores import Score
-from ..data.tables import DONE
+from ..results import DONE, Results
+from ..scores import Score
 from .style import new_figure, save_picture, style
 
 Picture = NDArray[np.float64]
@@ -130,7 +129,7 @@ class Thumbnails:
 
     def tile(self, label: str, condition: str, target: str) -> Tile:
         """The capture of the first repeat that is done, with its own scores; without one, the reason in its place."""
-        cells = self.results.cells(label, condition)
+        cells = self.results.cells[label, condition]
         cells = cells[cells["target"] == target]
         if cells.empty:
             return Tile(None, "not planned")

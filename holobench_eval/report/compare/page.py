@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ..data.scores import Score
-from ..data.tables import csv_text
-from ..data.text import words
 from ..markdown import Markdown, blocks, heading, table_of
+from ..results import csv_text
+from ..scores import Score
+from ..text import words
 from .paired import EQUAL, Comparison, Row, provenance_differences
 
 TARGETS = 10  # that changed most, in the list

@@ -16,9 +16,9 @@ import pandas as pd
 from ...core.errors import UserError, one_line, suggest
 from ...study.plan import REFERENCE, is_reference
 from ...study.running import provenance
-from ..data.scores import Score, parse
-from ..data.statistics import Array, Estimate, family_p, mean_interval
-from ..data.tables import DONE, clusters_in, read_records, records_text, score_columns
+from ..results import DONE, clusters_in, read_records, records_text, score_columns
+from ..scores import Score, parse
+from ..statistics import Array, Estimate, family_p, mean_interval
 
 # What names a cell in records.csv whatever code computed it: the same in two runs of a study.
 CELL = ("label", "condition", "target", "repeat")

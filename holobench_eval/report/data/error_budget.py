@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...metrics import error_budget as scores
-from .results import Results
-from .statistics import Array, Estimate
+from ..results import Results
+from ..statistics import Array, Estimate
 
 # Labels of the parts that are of no method.
 IDEAL_IMAGE, REST, NOISE = "the ideal image", "unexplained", "temporal noise"
@@ -61,7 +61,7 @@ class Budget:
 
 def budgets(results: Results) -> list[Budget]:
     """The budget of every display on which all methods have the scores for all targets."""
-    if results.layout.measure != "error_budget":
+    if results.study.measure != "error_budget":
         return []
     return [
         _budget(results, condition)

@@ -16,9 +16,9 @@ import numpy as np
 
 from ...study.calibration import value_of
 from ...study.calibration.family import load_family, names
+from ..results import Results
+from ..statistics import FEWEST_DISPLAYS, Array, Estimate, two_way
 from .error_budget import budgets
-from .results import Results
-from .statistics import FEWEST_DISPLAYS, Array, Estimate, two_way
 
 
 @dataclass(frozen=True)
@@ -51,29 +51,28 @@ def is_many(results: Results) -> bool:
 
 def applies(results: Results) -> bool:
     """Whether a study compares methods, and not only oracles, with a baseline over many displays."""
-    layout = results.layout
-    compared = {*layout.methods} - {*layout.privileged, layout.baseline}
-    return is_many(results) and not layout.predicts and layout.baseline is not None and bool(compared)
+    compared = {*results.labels} - {*results.facts.oracles, results.baseline}
+    return is_many(results) and not results.facts.predicts and results.baseline is not None and bool(compared)
 
 
 def shown_on(results: Results) -> list[str]:
     """The displays on which every method that is compared has a score for every target."""
-    rows = [label for label in results.layout.methods if label not in results.layout.privileged]
+    rows = [label for label in results.labels if label not in results.facts.oracles]
     return [name for name in results.conditions if all(results.is_complete(label, name) for label in rows)]
 
 
 def margins(results: Results) -> list[Margin]:
     """Every method but the baseline and oracles, the best first."""
     where, sign = shown_on(results), results.headline.sign
-    baseline = str(results.layout.baseline)
+    baseline = str(results.baseline)
     names, index = np.unique(results.clusters, return_inverse=True)
     shares = np.eye(len(names))[index] / np.bincount(index)
     found = []
-    for label in results.layout.methods if where else ():
-        if label == baseline or label in results.layout.privileged:
+    for label in results.labels if where else ():
+        if label == baseline or label in results.facts.oracles:
             continue
         differences = np.stack([results.values(label, name) - results.values(baseline, name) for name in where])
-        tests = [test for test in results.against_baseline if test.second == label and test.condition in where]
+        tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
         better, worse = (
             sum(test.is_shown and side * sign * test.estimate.mean > 0 for test in tests) for side in (1, -1)
         )
@@ -86,7 +85,7 @@ def margins(results: Results) -> list[Margin]:
 def gains(results: Results) -> dict[str, Array]:
     """``(displays,)`` by how much each method is better than the baseline, which is the first; on ``shown_on``."""
     rows = {each.label: results.headline.sign * each.values for each in margins(results)}
-    return {str(results.layout.baseline): np.zeros(len(shown_on(results))), **rows}
+    return {str(results.baseline): np.zeros(len(shown_on(results))), **rows}
 
 
 def winners(gained: Mapping[str, Array]) -> Counter[str]:
@@ -96,14 +95,14 @@ def winners(gained: Mapping[str, Array]) -> Counter[str]:
 
 def published(results: Results, label: str, condition: str) -> float | None:
     """The margin of two published figures beside a display, where a method and the baseline have one."""
-    names, metric = (label, str(results.layout.baseline)), results.headline.metric
-    own, other = (results.layout.published(name, condition).get(metric) for name in names)
+    names, metric = (label, str(results.baseline)), results.headline.metric
+    own, other = (results.facts.published(name, condition).get(metric) for name in names)
     return None if own is None or other is None else own - other
 
 
 def parameters(results: Results) -> dict[str, Array]:
     """What differs between the displays of a family, ``(displays,)`` by words; empty where they are of none."""
-    profiles = [results.layout.profiles[name] for name in shown_on(results) if name in results.layout.profiles]
+    profiles = [results.facts.profiles[name] for name in shown_on(results) if name in results.facts.profiles]
     family = next((name for name in names() if all(one.name.startswith(f"{name}-") for one in profiles)), None)
     if family is None or len(profiles) < FEWEST_DISPLAYS:
         return {}
@@ -188,7 +187,7 @@ def judged(results: Results) -> dict[str, tuple[int, int]]:
     From the related study that measured both: right ones and pairs over displays, by the title of the score.
     """
     found, told = {each.label: each for each in margins(results)}, dict[str, tuple[int, int]]()
-    models = (one for one in results.related.values() if one.layout.measure == "prediction" and one.control)
+    models = (one for one in results.related.values() if one.study.measure == "prediction" and one.control)
     other = next(models, None)
     if other is None:
         return {}

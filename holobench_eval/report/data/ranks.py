@@ -11,9 +11,9 @@ import pandas as pd
 from scipy import stats
 
 from ...display.simulated.changes.draws import PARAMETERS
-from .layout import OFFLINE, Swept
-from .results import Results
-from .statistics import Array, Cause, Estimate, cause, mean_interval
+from ..facts import OFFLINE, Swept
+from ..results import Results
+from ..statistics import Array, Cause, Estimate, cause, mean_interval
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
@@ -60,7 +60,7 @@ class Ranks:
         """Mean headline, a column a method; a row for the nominal display, then one a draw. Turned so that larger is
         better, NaN where a target has no score."""
         results, conditions = self.results, [self.swept.before, *(name for _, name in self.swept.points)]
-        labels = [label for label in results.methods(conditions[0]) if results.layout.category(label) in OFFLINE]
+        labels = [label for label in results.methods(conditions[0]) if results.category(label) in OFFLINE]
         means = {label: [results.values(label, name).mean() for name in conditions] for label in labels}
         return results.headline.sign * pd.DataFrame(means, dtype=np.float64)
 
@@ -170,4 +170,4 @@ def share(count: int, total: int) -> Estimate:
 
 def ranks(results: Results) -> list[Ranks]:
     """The rankings of every display of which a study has draws."""
-    return [Ranks(swept, results) for swept in results.layout.sweeps if swept.kind == "draw"]
+    return [Ranks(swept, results) for swept in results.facts.sweeps if swept.kind == "draw"]

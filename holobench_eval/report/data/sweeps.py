@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...display.simulated.changes import KINDS, Kind
-from .layout import Swept
-from .results import Results
-from .statistics import Estimate, ratio_interval
+from ..facts import Swept
+from ..results import Results
+from ..statistics import Estimate, ratio_interval
 
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 
@@ -115,4 +115,4 @@ class Sweep:
 
 def sweeps(results: Results) -> list[Sweep]:
     """The sweeps of a study without draws, which are other benches and are asked for rankings, not for losses."""
-    return [Sweep(swept, results) for swept in results.layout.sweeps if swept.kind != "draw"]
+    return [Sweep(swept, results) for swept in results.facts.sweeps if swept.kind != "draw"]

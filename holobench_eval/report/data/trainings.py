@@ -10,9 +10,9 @@ from typing import Any
 
 from ...study.artifacts import TrainingRecord, training_records
 from ...study.plan import is_reference
-from .layout import Layout
-from .tables import DONE
-from .text import words
+from ..facts import Facts
+from ..results import DONE
+from ..text import words
 
 DISPLAY = "the display itself"
 
@@ -47,7 +47,7 @@ class Training:
         return value if isinstance(value, str) else ""
 
 
-def trainings(layout: Layout, records: Sequence[Mapping[str, Any]], output: Path) -> list[Training]:
+def trainings(facts: Facts, records: Sequence[Mapping[str, Any]], output: Path) -> list[Training]:
     """Everything that a study had to learn, in the order of its rows, the display last.
 
     What a method needs is named first in a cell's ``prepared``, what the display needs last.
@@ -55,12 +55,12 @@ def trainings(layout: Layout, records: Sequence[Mapping[str, Any]], output: Path
     needed: dict[str, list[tuple[str, str, str]]] = {}  # by identity: label, condition, digest of what was learned
     for record in records:
         cell, prepared = record["cell"], record["cell"].get("prepared") or ()
-        if prepared and not is_reference(cell["condition"]) and record["label"] in layout.trained:
+        if prepared and not is_reference(cell["condition"]) and facts.of(record["label"], "trained", False):
             learned = record["learned"]["sha256"] if record["state"] == DONE and record.get("learned") else ""
             needed.setdefault(prepared[0], []).append((record["label"], cell["condition"], learned))
-    for record in records if layout.learned_display is not None else ():
+    for record in records if facts.network else ():
         if prepared := record["cell"]["prepared"]:
-            needed.setdefault(prepared[-1], []).append((DISPLAY, str(layout.learned_display), ""))
+            needed.setdefault(prepared[-1], []).append((DISPLAY, facts.network, ""))
     known = training_records(output)
     trained = [_training(known.get(identity), uses) for identity, uses in needed.items()]
     names = [item.name for item in trained]

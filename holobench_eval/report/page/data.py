@@ -8,16 +8,15 @@ from typing import Any
 
 from matplotlib import colormaps
 
+from ..board import GROUPS, board
 from ..charts.look.methods import looks
-from ..data.board import GROUPS, board
-from ..data.columns import costs
-from ..data.phrases import counted, tested, verdict
-from ..data.results import Results
-from ..data.scores import Score
-from ..data.statistics import Estimate
-from ..data.tables import to_json
-from ..data.text import number
+from ..columns import costs
+from ..phrases import counted, verdict
+from ..results import Results, to_json
+from ..scores import Score
 from ..section import Report
+from ..statistics import Estimate
+from ..text import number
 
 Json = dict[str, Any]
 
@@ -26,13 +25,13 @@ TIER, GAIN, P = "tier", "gain", "p"
 
 def page_data(report: Report) -> Json:
     """Everything that the page draws, ready for JSON: no NaN, and numbers rounded as in table.csv."""
-    results, text = report.results, report.results.layout.text
+    results, text = report.results, report.results.text
     tiers = {display.name: {row.label: row.tier for row in display.rows} for display in board(results).displays}
     tiers |= {name: dict.fromkeys(results.methods(name), "") for name in results.changed}
     colours, column = looks(results.names), results.headline.column
     return {
         "headline": _score(results.headline),
-        "baseline": results.layout.baseline,
+        "baseline": results.baseline,
         "words": {"scored": text.scored, "truth": text.truth},
         "displays": results.conditions,
         "changed": results.changed,
@@ -41,8 +40,8 @@ def page_data(report: Report) -> Json:
         "methods": {
             label: {
                 "registered": results.names[label],
-                "group": GROUPS[results.layout.category(label)],
-                "oracle": label in results.layout.privileged,
+                "group": GROUPS[results.category(label)],
+                "oracle": label in results.facts.oracles,
                 "colour": colours[label].colour,  # the same as in the figures
             }
             for label in dict.fromkeys(label for labels in tiers.values() for label in labels)
@@ -56,7 +55,7 @@ def page_data(report: Report) -> Json:
         },
         "floors": {
             name: [
-                {"name": text.floor_name(floor), "mean": to_json(results.row(floor, results.reference(name))[column])}
+                {"name": text.floor_name(floor), "mean": to_json(results.rows[floor, results.reference(name)][column])}
                 for floor in results.floors
                 if results.has_pictures(name)
             ]
@@ -82,21 +81,21 @@ def _columns(results: Results) -> Iterator[Json]:
     yield {"key": TIER, "heading": "letter", "higher": False}
     for score in results.leading:
         yield {"key": score.key, "heading": score.heading, "higher": score.higher_is_better}
-        if score == results.headline and results.layout.baseline is not None:
-            heading = f"difference to {results.layout.baseline}{score.brackets}"
+        if score == results.headline and results.baseline is not None:
+            heading = f"difference to {results.baseline}{score.brackets}"
             yield {"key": GAIN, "heading": heading, "higher": score.higher_is_better}
             yield {"key": P, "heading": "adjusted p", "higher": False}
-    for key, heading in costs(results.table, results.layout.text.each).items():
+    for key, heading in costs(results.table, results.text.each).items():
         yield {"key": key, "heading": heading, "higher": False}
 
 
 def _row(results: Results, label: str, condition: str, tier: str) -> Json:
     """A row of the table: of every column the value, the interval where there is one, and the text."""
-    row, gain = results.row(label, condition), results.gain(label, condition)
-    test = tested(results, label, condition)
+    row, gain = results.rows[label, condition], results.gain(label, condition)
+    test = results.tested(label, condition)
     cells = {TIER: _cell(tier, float(ord(tier)))} if tier else {}
     cells |= {score.key: _estimate(score, score.of(row)) for score in results.leading}
-    if gain is not None and label != results.layout.baseline:
+    if gain is not None and label != results.baseline:
         cells[GAIN] = _estimate(results.headline, gain, signed=True)
     if test and not math.isnan(test.p):
         cells[P] = _cell("< 0.001" if test.p < 0.001 else f"{test.p:.3f}", test.p)

@@ -62,7 +62,7 @@ def page(report: Report) -> str:
     data |= {"pictures": shown}
     template = templates("holobench_eval.report.page", "assets").get_template("page.html")
     return template.render(
-        title=report.layout.title,
+        title=report.results.study.title,
         policy=policy(scripts, style),
         style=Markup(style),
         counts=counts(report.results),

@@ -14,7 +14,8 @@ from PIL import Image
 from ...core.io import write_atomically
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.tiles import spread
-from ..data.results import Results
+from ..facts import ORACLE
+from ..results import Results
 from ..section import Report
 from .data import Json
 
@@ -74,7 +75,7 @@ def _numbers(report: Report, found: Iterable[Cell]) -> Json:
 
 
 def _note(report: Report, held: int, there: int) -> str:
-    text = report.layout.text
+    text = report.results.text
     sizes = (
         f"Pictures are 8-bit sRGB, pixel for pixel from the records, or the report's WebP copies where these are not "
         f"there; {text.scored}s are registered and matched in intensity, and reduced where the longer side would "
@@ -117,7 +118,11 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
     """The best method of a display, the baseline and the oracle."""
     results = report.results
     for condition in conditions:
-        roles = (*results.ranking(condition)[:1], results.layout.baseline, results.oracle(condition))
+        roles = (
+            *results.ranking(condition)[:1],
+            results.baseline,
+            *results.ranking(condition, categories=(ORACLE,))[:1],
+        )
         for label in dict.fromkeys(role for role in roles if role in results.methods(condition)):
             yield str(label), condition, target
 

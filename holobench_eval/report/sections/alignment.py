@@ -10,12 +10,11 @@ import numpy as np
 
 from ...study.folders import alignment_name
 from ...study.plan import is_reference
-from ..data.results import Results
-from ..data.scores import Score, parse
-from ..data.tables import DONE
-from ..data.text import FILES
 from ..markdown import Markdown, bullets, heading, table_of
+from ..results import DONE, Results
+from ..scores import Score, parse
 from ..section import Blocks, Figures, Report, Section
+from ..text import FILES
 
 AGREE = 0.2  # dB of the headline PSNR by which two aligners may differ before the report warns
 UNKNOWN = "–"
@@ -176,5 +175,5 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 SECTIONS = (
-    Section("alignment", 140, _render, applies=lambda report: report.layout.measure == FILES, figures=_figures),
+    Section("alignment", 140, _render, applies=lambda report: report.results.study.measure == FILES, figures=_figures),
 )

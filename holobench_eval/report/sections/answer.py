@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from ..answers import kind_of
 from ..answers.limits import FIRST, limits
-from ..data.results import Results
-from ..data.tables import DONE
-from ..data.text import FILES
 from ..markdown import Markdown, beginning, bullets, code_block, heading
+from ..results import DONE, Results
 from ..section import Blocks, Figures, Report, Section
+from ..text import FILES
 
 
 def _title(report: Report, _: Figures) -> Blocks:
-    return [heading(report.layout.title, 1), beginning(report.layout.question or kind_of(report.results).question)]
+    return [
+        heading(report.results.study.title, 1),
+        beginning(report.results.study.question or kind_of(report.results).question),
+    ]
 
 
 def _answer(report: Report, _: Figures) -> Blocks:
@@ -29,8 +31,8 @@ def _limits(report: Report, _: Figures) -> Blocks:
 
 def _more_limits(report: Report, _: Figures) -> Blocks:
     yield heading("Limits")
-    if report.layout.would_change:
-        yield Markdown("**What would change the answer.** {}").format(report.layout.would_change)
+    if report.results.study.would_change:
+        yield Markdown("**What would change the answer.** {}").format(report.results.study.would_change)
     yield bullets(limits(report, kind_of(report.results))[FIRST:])
 
 
@@ -54,7 +56,7 @@ def counts(results: Results) -> str:
     )
     size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in parts)
     holes = f", {len(cells) - done} without a score" if done < len(cells) else ""
-    cell = "picture" if results.layout.measure == FILES else "cell"
+    cell = "picture" if results.study.measure == FILES else "cell"
     return f"{size}: {len(cells)} {cell}s{holes}."
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..answers import budget, kind_of
 from ..answers.kind import subjects
+from ..board import board
 from ..charts import paired
 from ..charts.curves import draw_costs
 from ..charts.error_budget import draw_budgets
@@ -16,9 +17,8 @@ from ..charts.family import draw_map
 from ..charts.look.methods import looks
 from ..charts.tiles import draw_rows
 from ..data import over_displays
-from ..data.board import board
 from ..data.error_budget import budgets
-from ..data.results import Results
+from ..results import Results
 from ..section import Blocks, Figures, Report, Section
 
 PICTURES = "answer-pictures.jpg"
@@ -59,11 +59,11 @@ def _map(report: Report) -> Iterator[tuple[Path, str]]:
     if found := over_displays.display_map(results):
         wanted = [*subjects(results), *(label for label in found.labels[1:] if label not in subjects(results))]
         looked, path = looks(results.names), report.figures / "quality-map.png"
-        axis = f"difference to {results.layout.baseline} in {results.headline.axis}"
+        axis = f"difference to {results.baseline} in {results.headline.axis}"
         draw_map(path, found, axis, {label: looked[label] for label in wanted[:MOST_METHODS]})
         yield (
             path,
-            f"Differences to {results.layout.baseline}, a mark a display, against two parts of its error, as error "
+            f"Differences to {results.baseline}, a mark a display, against two parts of its error, as error "
             "budgets of the displays found them. Lines: least squares, for the eye.",
         )
 
@@ -84,9 +84,9 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
         return
     target = thumbnails.middle(condition)
     labels = chosen(results, condition)
-    tiles = [(report.layout.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
+    tiles = [(report.results.facts.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
     if any(tile.picture is not None for _, tile in tiles):
-        path, text = report.figures / PICTURES, report.layout.text
+        path, text = report.figures / PICTURES, report.results.text
         middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
         draw_rows(path, f"{condition}", (target, thumbnails.targets(condition)[target]), [("", tiles)])
         yield (
@@ -102,7 +102,7 @@ def chosen(results: Results, condition: str) -> list[str]:
     if len(everybody) <= MOST_TILES:
         return everybody
     firsts = [rows[0].label for _, rows in display.groups]
-    wanted = dict.fromkeys([*firsts, *subjects(results), str(results.layout.baseline)])
+    wanted = dict.fromkeys([*firsts, *subjects(results), str(results.baseline)])
     return [label for label in everybody if label in wanted]
 
 
@@ -125,7 +125,7 @@ def _budgets(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _spends(results: Results) -> bool:
-    known = results.layout.spends_captures and not results.layout.predicts and "total_captures" in results.table
+    known = results.facts.spends and not results.facts.predicts and "total_captures" in results.table
     return known and not over_displays.is_many(results) and bool((results.table["total_captures"] > 0).any())
 
 
@@ -136,7 +136,7 @@ def _is_budget(report: Report) -> bool:
 def _costs(report: Report) -> Iterator[tuple[Path, str]]:
     """Quality against the photographs that it cost."""
     results, path = report.results, report.figures / "quality-captures.png"
-    axis = f"{results.headline.axis}{results.layout.text.axis}"
+    axis = f"{results.headline.axis}{results.text.axis}"
     displays = [each for each in board(results).displays if any(row.photographs for row in each.rows)]
     draw_costs(path, displays, results.names, looks(results.names), axis)
     yield (
@@ -149,7 +149,10 @@ def _costs(report: Report) -> Iterator[tuple[Path, str]]:
 SECTIONS = (
     Section("overview", 3, _table, applies=_has_scores),
     Section(
-        "plot", 4, applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget", figures=_plot
+        "plot",
+        4,
+        applies=lambda report: _has_scores(report) and report.results.study.measure != "error_budget",
+        figures=_plot,
     ),
     Section("error budget", 5, figures=_budgets),
     Section(

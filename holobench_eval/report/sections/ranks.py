@@ -9,10 +9,10 @@ from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..charts.ranks import draw_ranks
 from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Pair, Ranks
-from ..data.statistics import CLEAR, mean_interval
-from ..data.text import percent, words
 from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
+from ..statistics import CLEAR, mean_interval
+from ..text import percent, words
 
 
 def _render(report: Report, _: Figures) -> Blocks:

@@ -6,27 +6,26 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...study.plan import is_reference
-from ..data.layout import FLOOR, TrainingSet
-from ..data.results import Results
-from ..data.text import FILES, plain
+from ..facts import FLOOR, TrainingSet
 from ..markdown import Markdown, bullets, code, code_block, heading, properties, table
+from ..results import Results
 from ..section import Blocks, Figures, Report, Section
+from ..text import FILES, plain
 from .alignment import agreement
 
 TARGETS_NAMED = 40
 
 
 def _setup(report: Report, _: Figures) -> Blocks:
-    layout = report.layout
     yield heading("What was measured")
-    yield layout.text.procedure
-    yield properties(_from_files(report) if layout.measure == FILES else _on_displays(report))
+    yield report.results.text.procedure
+    yield properties(_from_files(report) if report.results.study.measure == FILES else _on_displays(report))
 
 
 def _described(report: Report, _: Figures) -> Blocks:
-    layout, displays = report.layout, report.description.displays
+    displays = report.description.displays
     yield heading("Displays and methods")
-    yield layout.text.displays if displays else "No description of the displays was recorded."
+    yield report.results.text.displays if displays else "No description of the displays was recorded."
     for display in displays:
         yield heading(f"Display {display.name}", 3)
         yield display.heading
@@ -36,27 +35,36 @@ def _described(report: Report, _: Figures) -> Blocks:
 
 
 def _details(report: Report, _: Figures) -> Blocks:
-    yield heading(Markdown("Details: {}").format(report.layout.title), 1)
+    yield heading(Markdown("Details: {}").format(report.results.study.title), 1)
     yield Markdown("What [report.md](report.md) rests on, number by number.")
 
 
 def _on_displays(report: Report) -> list[tuple[str, str]]:
     """Name and value of everything that was the same for all methods."""
-    layout, cells = report.layout, [record["cell"] for record in report.records]
+    facts, study, cells = report.results.facts, report.results.study, [record["cell"] for record in report.records]
+    probe = study.holograms
     sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
     panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
     return [
-        *([("measured", f"predictions of the captures of holograms by {layout.holograms}")] * layout.predicts),
+        *(
+            [
+                (
+                    "measured",
+                    f"predictions of the captures of holograms by {probe.name} ({plain(probe.params)})",
+                )
+            ]
+            * facts.predicts
+        ),
         _targets(report.results),
         ("dataset", "; ".join(sets)),
-        *([("training images", _training_images(layout.training))] if layout.training else []),
+        *([("training images", _training_images(facts.training))] if facts.training else []),
         ("panel", "; ".join(panels)),
         ("exposure", _distinct(report.results, "exposure")),
         ("metric protocol", _distinct(report.results, "protocol")),
         ("repeats", str(report.results.frame["repeat"].nunique())),
-        ("seed", str(layout.seed)),
+        ("seed", str(study.seed)),
         ("headline metric", report.results.headline.axis),
-        ("baseline", layout.baseline or "none"),
+        ("baseline", report.results.baseline or "none"),
         ("registration", _registration(report.results)),
         ("saturated samples of a capture", _saturation(report.results)),
     ]
@@ -69,20 +77,20 @@ def _from_files(report: Report) -> list[tuple[str, str]]:
     return [
         _targets(report.results),
         ("size of the captures", f"{'; '.join(sizes)} pixels"),
-        ("compared", report.layout.text.compared),
+        ("compared", report.results.text.compared),
         ("metric protocol", _distinct(report.results, "protocol")),
         ("headline metric", report.results.headline.axis),
-        ("baseline", report.layout.baseline or "none"),
+        ("baseline", report.results.baseline or "none"),
         ("saturated samples of a capture", _saturation(report.results)),
     ]
 
 
 def _registration(results: Results) -> str:
     """How far the geometry was off, display by display, and whether a second aligner agrees."""
-    layout, done = results.layout, results.done
-    if layout.learned_display is not None:
+    done = results.done
+    if results.facts.network:
         return "none: the network predicts in the frame of the target"
-    changed = done["condition"].isin(layout.changed)
+    changed = done["condition"].isin(results.facts.changed)
     named = done["condition"].where(~changed, "displays after a change")
     residuals = [
         f"{condition} {' to '.join(dict.fromkeys(f'{end:.3f}' for end in (cells.min(), cells.max())))} px"
@@ -90,11 +98,11 @@ def _registration(results: Results) -> str:
         if cells.notna().any()
     ]
     found = f"rms residual, in pixels of the scored region: {', '.join(residuals)}" if residuals else "not recorded"
-    return f"{found}. {agreement(results)}" if layout.real else found
+    return f"{found}. {agreement(results)}" if results.study.display.real else found
 
 
 def _saturation(results: Results) -> str:
-    if results.layout.learned_display is not None:
+    if results.facts.network:
         return "none: there is no sensor"
     most = float(results.done["saturated"].max())
     return f"at most {100 * most:.3g} %" if most >= 0 else "not recorded"
@@ -150,6 +158,6 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 SECTIONS = (
     Section("details", 1, _details, details=True),
     Section("setup", 10, _setup, details=True),
-    Section("displays and methods", 20, _described, lambda report: report.layout.measure != FILES, details=True),
+    Section("displays and methods", 20, _described, lambda report: report.results.study.measure != FILES, details=True),
     Section("environment", 220, _environment, details=True),
 )

@@ -8,10 +8,10 @@ from pathlib import Path
 from ..charts.curves import draw_sweep
 from ..charts.style import slugs
 from ..charts.tiles import draw_rows, spread
-from ..data.layout import OFFLINE, ONLINE
 from ..data.sweeps import Sweep
-from ..data.text import grouped
+from ..facts import OFFLINE, ONLINE
 from ..section import Report, Section
+from ..text import grouped
 
 MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
 MOST_ROWS = 4
@@ -27,7 +27,7 @@ def _curves(report: Report) -> Iterator[tuple[Path, str]]:
     results = report.results
     for kind, same in grouped((sweep.swept.kind, sweep) for sweep in _drawable(report)).items():
         path = report.figures / f"quality-sweep-{kind}.png"
-        draw_sweep(path, same, f"{results.headline.axis}{report.layout.text.axis}")
+        draw_sweep(path, same, f"{results.headline.axis}{report.results.text.axis}")
         yield (
             path,
             f"{results.headline.axis} along a change: {same[0].kind.words}. Mean over targets; bars, slightly offset: "
@@ -58,7 +58,7 @@ def _chosen(sweep: Sweep) -> list[str]:
     """At most ``MOST_ROWS`` methods: the baseline, the paper's, then the best of the others on the display before the
     change, without the oracle."""
     results, before = sweep.results, sweep.swept.before
-    first = [label for label in sweep.methods if label == results.layout.baseline]
+    first = [label for label in sweep.methods if label == results.baseline]
     paper = [label for label in sweep.methods if results.names[label] == "hil"]
     ranked = results.ranking(before, categories=(*OFFLINE, ONLINE))
     others = [label for label in ranked if label in sweep.methods]

@@ -6,23 +6,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data.results import Results
-from ..data.statistics import FEWEST, POWER, SIGNIFICANCE, PairedTest
-from ..data.text import sample
 from ..markdown import Markdown, heading, table_of
+from ..results import Results
 from ..section import Blocks, Figures, Report, Section
+from ..statistics import FEWEST, POWER, SIGNIFICANCE, PairedTest
+from ..text import sample
 
 
 def _paired_tests(report: Report, _: Figures) -> Blocks:
     results = report.results
-    tests = results.against_baseline
+    tests = list(results.tests.values())
     yield heading("Paired tests")
     if not tests:
         yield "There are no comparisons with a baseline."
         return
     yield (
-        f"Differences to the baseline {report.layout.baseline}, target by target, repeats averaged first: "
-        f"{results.headline.axis}{report.layout.text.axis}. Two-sided sign-flip min-p test (step-down) over "
+        f"Differences to the baseline {report.results.baseline}, target by target, repeats averaged first: "
+        f"{results.headline.axis}{report.results.text.axis}. Two-sided sign-flip min-p test (step-down) over "
         f"clusters of targets; each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this "
         "table, in which the oracle has none; intervals are not adjusted. At "
         f"p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
@@ -33,7 +33,7 @@ def _paired_tests(report: Report, _: Figures) -> Blocks:
 
 
 def _tests(results: Results, tests: Sequence[PairedTest]) -> Markdown | None:
-    score, name = results.headline, results.layout.marked
+    score, name = results.headline, results.facts.marked
     return table_of(
         [
             {

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ..charts.curves import draw_trainings
-from ..data.layout import Layout
-from ..data.text import number, words
 from ..data.trainings import DISPLAY, Training
+from ..facts import Facts
 from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
+from ..text import number, words
 
 DIGITS = 10  # of a sha256 that are printed
 
@@ -22,7 +22,7 @@ def _render(report: Report, figures: Figures) -> Blocks:
         "Training took place before any target was seen. Held-out images only monitor it; their captures and their "
         "time are counted."
     )
-    yield _summary(report.layout, report.trainings)
+    yield _summary(report.results.facts, report.trainings)
     yield bullets(_doubts(report.trainings))
     rounds = _rounds(report.trainings)
     if rounds:
@@ -35,9 +35,9 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield from figures
 
 
-def _summary(layout: Layout, trainings: Sequence[Training]) -> Markdown | None:
+def _summary(facts: Facts, trainings: Sequence[Training]) -> Markdown | None:
     """What each training took."""
-    given, features = layout.training, any(training.text("perceptual") for training in trainings)
+    given, features = facts.training, any(training.text("perceptual") for training in trainings)
     images, held_out = (given.images - given.held_out, given.held_out) if given else ("–", "–")
     return table_of(
         [

@@ -20,10 +20,9 @@ from ...core.errors import StorageError, UserError, reason
 from ...core.io import TEMPORARY, read_text, write_atomically
 from ...study.running import provenance
 from ..compare.paired import read_run
-from ..data.layout import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE, Layout, network_of
-from ..data.results import Results
-from ..data.tables import GUARDED, MOST_BYTES, clusters_in, records_text, score_columns
+from ..facts import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE, Layout, network_of
 from ..page.html import asset
+from ..results import GUARDED, MOST_BYTES, Results, clusters_in, records_text, score_columns
 from .html import page, slug
 from .pages import Study, about, cards, places
 from .pictures import figures

@@ -14,9 +14,9 @@ from ...core.errors import UserError
 from ...display.simulated.profile import load_profile, names
 from ...display.simulated.shelf import installed
 from ..answers.comparison import of_display
-from ..data.board import Board, Display, Row, board
-from ..data.results import Results
-from ..data.text import grouped
+from ..board import Board, Display, Row, board
+from ..results import Results
+from ..text import grouped
 from .pictures import STAGES, Picture
 
 BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays
@@ -102,7 +102,7 @@ class Shown:
     def verdict(self) -> str:
         """Of a comparison of pictures."""
         results = self.of.results
-        return of_display(results, self.display) if results.layout.measure == "picture" else ""
+        return of_display(results, self.display) if results.study.measure == "picture" else ""
 
     @property
     def pictures(self) -> list[Picture]:
