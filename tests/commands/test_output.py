@@ -50,7 +50,7 @@ def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(records, enco
     for condition in results.conditions:
         assert f"{condition}: PSNR, linear light [dB]" in text
         for name in results.methods(condition):
-            assert results.headline.number(results.row(name, condition)[results.headline.column]) in text
+            assert results.headline.number(results.rows[name, condition][results.headline.column]) in text
 
 
 def test_the_answer_of_the_report_stands_below_the_tables(records):

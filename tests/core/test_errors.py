@@ -14,7 +14,7 @@ from holobench_eval.core import compiled, errors
 from holobench_eval.core.device import CPU
 from holobench_eval.core.graphs import WARM_UP, is_recorded, repeated
 from holobench_eval.core.hashing import canonical, digest
-from holobench_eval.report.data.text import words
+from holobench_eval.report.text import words
 from tests.support.benches.replaying import Traffic, fake_device
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.core import plugins, released
-from holobench_eval.report.data.phrases import edited as told
+from holobench_eval.report.phrases import edited as told
 from holobench_eval.study.versions import dataset_version, method_version
 from tests.golden.released import digests
 

@@ -21,9 +21,9 @@ from holobench_eval.display.simulated.pipeline import BenchSession
 from holobench_eval.lab.real import RealSession
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.report.data.layout import layout_of
-from holobench_eval.report.data.results import Results
-from holobench_eval.report.data.tables import records_frame
+from holobench_eval.report.facts import layout_of
+from holobench_eval.report.results import Results
+from holobench_eval.report.results import records_frame
 from holobench_eval.report.files import write_files
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial

@@ -7,7 +7,7 @@ from scipy import stats
 
 from holobench_eval.datasets.base import clusters_of
 from holobench_eval.datasets.crops import Crops
-from holobench_eval.report.data import statistics
+from holobench_eval.report import statistics
 from holobench_eval.report.statistics import _signs, family_p, mean_interval, ratio_interval, two_way
 from tests.support.coverage import (
     DESIGNS,

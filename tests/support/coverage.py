@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from holobench_eval.report.data.statistics import (
+from holobench_eval.report.statistics import (
     SIGNIFICANCE,
     Estimate,
     family_p,

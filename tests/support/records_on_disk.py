@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from holobench_eval.report.data.tables import csv_text
+from holobench_eval.report.results import csv_text
 
 Scores = Mapping[tuple[str, str], Sequence[float | None]]  # (method, display): PSNR [dB] of a target each, None: failed
 

@@ -9,7 +9,7 @@ import pytest
 
 from holobench_eval.commands.reports.rerun import Planned, Verdict, rerun, sample
 from holobench_eval.report import layout_of, recompute_files
-from holobench_eval.report.data.tables import csv_text, read_records, records_frame
+from holobench_eval.report.results import csv_text, read_records, records_frame
 from holobench_eval.study import executors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial

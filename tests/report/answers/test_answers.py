@@ -17,8 +17,8 @@ from holobench_eval.report.answers import ranks as ranks_kind
 from holobench_eval.report.answers import sweeps as sweeps_kind
 from holobench_eval.report.answers.kind import MOST_WORDS, Kind, subjects
 from holobench_eval.report.answers.limits import limits
-from holobench_eval.report.data.board import board
-from holobench_eval.report.data.layout import CALIBRATED, OPEN_LOOP, Swept
+from holobench_eval.report.board import board
+from holobench_eval.report.facts import CALIBRATED, OPEN_LOOP, Swept
 from holobench_eval.report.description import Description
 from holobench_eval.report.section import Report
 from holobench_eval.study.definition import Claim

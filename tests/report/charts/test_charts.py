@@ -15,7 +15,7 @@ from holobench_eval.report.charts import curves, paired, sheet, tiles
 from holobench_eval.report.charts.look.methods import REGISTRY, looks
 from holobench_eval.report.charts.sheet import draw_sheet, drawn_from, save_sheet
 from holobench_eval.report.charts.style import LARGEST, save, save_picture, slugs
-from holobench_eval.report.data.board import board
+from holobench_eval.report.board import board
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic
 
@@ -108,7 +108,7 @@ def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(tmp_path: Path
     curves.draw_costs(tmp_path / "x.png", displays, found.names, looks(found.names), "PSNR [dB]")
     assert imread(tmp_path / "x.png").shape[1] == 900  # as wide as any other
     for axes, display in zip(figures[0].axes, displays, strict=True):
-        rows = [row for row in display.rows if row.label not in found.layout.privileged]
+        rows = [row for row in display.rows if row.label not in found.oracles]
         legend = axes.get_legend()
         assert legend is not None
         assert {text.get_text() for text in legend.get_texts()} == {row.label for row in rows}

@@ -7,7 +7,7 @@ import pytest
 from holobench_eval.metrics import error_budget as scores
 from holobench_eval.report import Description, write_report
 from holobench_eval.report.data.error_budget import budgets
-from holobench_eval.report.data.results import Results
+from holobench_eval.report.results import Results
 from tests.support import synthetic_study as synthetic
 
 METHODS = ("terms", "network", "field")

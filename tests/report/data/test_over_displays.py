@@ -15,7 +15,7 @@ from holobench_eval.report.build import related
 from holobench_eval.report.charts.family import draw_map
 from holobench_eval.report.charts.look.methods import looks
 from holobench_eval.report.charts.paired import draw_over_displays
-from holobench_eval.report.data.board import board
+from holobench_eval.report.board import board
 from holobench_eval.report.data.over_displays import (
     display_map,
     gains,
@@ -26,7 +26,7 @@ from holobench_eval.report.data.over_displays import (
     shown_on,
     winners,
 )
-from holobench_eval.report.data.statistics import FEWEST_DISPLAYS, cause
+from holobench_eval.report.statistics import FEWEST_DISPLAYS, cause
 from holobench_eval.report.files import write_files
 from tests.report.answers.test_answers import NOISE, TARGETS, results_of
 from tests.support import synthetic_study as synthetic

@@ -14,7 +14,7 @@ import pytest
 
 from holobench_eval.core.hashing import digest
 from holobench_eval.report import Description, Results, read_records, records_frame
-from holobench_eval.report.data.scores import parse
+from holobench_eval.report.scores import parse
 from holobench_eval.report.markdown import Markdown, table
 from holobench_eval.report.page import html
 from holobench_eval.report.page import pictures as module

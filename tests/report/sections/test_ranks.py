@@ -12,7 +12,7 @@ from skimage.io import imread
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import draws
 from holobench_eval.report import Layout, Results, layout_of, records_frame, write_report
-from holobench_eval.report.data.layout import Swept
+from holobench_eval.report.facts import Swept
 from holobench_eval.report.data.ranks import ranks, share
 from holobench_eval.report.description import Description
 from holobench_eval.report.sections import ranks as section_ranks

@@ -7,10 +7,10 @@ import pytest
 from PIL import Image
 
 from holobench_eval.report import Description, write_report
-from holobench_eval.report.data.layout import Layout, Swept
-from holobench_eval.report.data.results import Results
+from holobench_eval.report.facts import Layout, Swept
+from holobench_eval.report.results import Results
 from holobench_eval.report.data.sweeps import Sweep, sweeps
-from holobench_eval.report.data.tables import records_frame
+from holobench_eval.report.results import records_frame
 from tests.support import synthetic_study as synthetic
 
 TARGETS = ("a", "b", "c", "d")

@@ -10,7 +10,7 @@ import pytest
 from holobench_eval.display.estimates import estimate, joined
 from holobench_eval.report import Results
 from holobench_eval.report.charts.tiles import noted
-from holobench_eval.report.data.scores import parse
+from holobench_eval.report.scores import parse
 from holobench_eval.report.data.trainings import Training
 from holobench_eval.report.description import Description
 from holobench_eval.report.section import Report

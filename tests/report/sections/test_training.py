@@ -11,7 +11,7 @@ from holobench_eval.report import Description, Results, records_frame, table_fro
 from holobench_eval.report.answers import kind_of
 from holobench_eval.report.answers.limits import limits
 from holobench_eval.report.charts.curves import MOST, draw_trainings
-from holobench_eval.report.data.layout import TrainingSet
+from holobench_eval.report.facts import TrainingSet
 from holobench_eval.report.description import Display
 from holobench_eval.report.markdown import blocks
 from holobench_eval.report.section import Report

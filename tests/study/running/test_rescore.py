@@ -10,7 +10,7 @@ import pytest
 
 from holobench_eval.display import CalibratedBench
 from holobench_eval.report import layout_of, records_frame
-from holobench_eval.report.data.tables import difference
+from holobench_eval.report.results import difference
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.phases import phases_of
