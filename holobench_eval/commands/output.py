@@ -114,10 +114,10 @@ def print_answer(console: Console, results: Results) -> None:
     The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that
     is worse than a constant image has a rank, too.
     """
-    from ..report.answers import kind_of
+    from ..report.stories import answer
     from ..report.data.phrases import too_few
 
-    for sentence in (*kind_of(results).answer(results), *filter(None, [too_few(results)])):
+    for sentence in (*answer(results), *filter(None, [too_few(results)])):
         console.print(f"- {sentence}", markup=False)
 
 

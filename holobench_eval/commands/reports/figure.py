@@ -23,7 +23,7 @@ def figure(
     from ...report import Results, layout_of, records_frame
     from ...report.build import print_figures, related
     from ...report.description import describe
-    from ...report.section import Report
+    from ...report.story import Report
 
     study, records, folder, known, _ = load(config, output)
     layout = layout_of(study)

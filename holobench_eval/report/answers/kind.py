@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ..data.board import Board
 from ..data.results import Results
-from ..data.text import words
 from ..markdown import Markdown
+from ..stories import MOST_WORDS as MOST_WORDS
+from ..story import mentioned as mentioned
+from ..story import subjects as subjects
 from .board import board_table
-
-MOST_WORDS = 40  # of a verdict
 
 
 @dataclass(frozen=True)
@@ -29,27 +28,3 @@ class Kind:
     verdicts: Callable[[Results], Iterable[str]]
     table: Callable[[Board], Markdown | None] = board_table
     limits: tuple[str, ...] = ()
-
-    def answer(self, results: Results) -> list[str]:
-        """The verdicts; a sentence in their place where no score allows one."""
-        if not results.conditions or results.done.empty:
-            return ["No cell of the study has a score, so there is no answer."]
-        found = [verdict for verdict in self.verdicts(results) if verdict]
-        told = mentioned(results.layout.methods, " ".join(found))
-        if untold := [label for label in subjects(results) if label not in told]:
-            found[:0] = [f"Nothing is said of {words(untold)}: a score is missing, of a target or of the baseline."]
-        return found or ["Too many scores are missing for an answer."]
-
-
-def subjects(results: Results) -> list[str]:
-    """The methods that the question names, in its order, without baseline and oracles: those it is about."""
-    layout = results.layout
-    aside = {layout.baseline, *layout.privileged}
-    return [label for label in mentioned(layout.methods, layout.question) if label not in aside]
-
-
-def mentioned(names: Iterable[str], text: str) -> list[str]:
-    """The names that stand in a text, in its order; the longest counts where one begins another."""
-    longest = sorted(set(names), key=lambda name: (-len(name), name))
-    pattern = "|".join(rf"(?<![\w-]){re.escape(name)}(?![\w-])" for name in longest)
-    return list(dict.fromkeys(match[0] for match in re.finditer(pattern, text))) if longest else []

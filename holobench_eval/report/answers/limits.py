@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from typing import Any
+
 import numpy as np
 
 from ..data.layout import FLOOR
@@ -12,16 +14,16 @@ from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, grouped, words
 from ..markdown import Markdown
 from ..section import Report
-from .kind import Kind, subjects
+from ..story import subjects
 
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
 MOST_NAMED = 4  # displays of one basis
 FIRST = 5  # that stand in report.md; the others are in details.md
 
 
-def limits(report: Report, kind: Kind) -> list[Markdown]:
+def limits(report: Report, kind: Any) -> list[Markdown]:
     """The items of the list, each with its name in bold, what matters most first."""
-    texts = [*remarks(report.results), *_sample(report), *_form(report), *kind.limits, *_displays(report)]
+    texts = [*remarks(report.results), *_sample(report), *_form(report), *getattr(kind, "LIMITS", ()), *_displays(report)]
     texts += [f"Measured: {report.layout.text.caution}"] * bool(report.layout.text.caution)
     texts += [f"Published: {report.layout.reported_source}."] * bool(report.layout.reported_source)
     texts += [f"Note: {report.layout.note}"] * bool(report.layout.note)

@@ -17,7 +17,7 @@ from ..data.scores import Score
 from ..data.statistics import Estimate
 from ..data.tables import to_json
 from ..data.text import number
-from ..section import Report
+from ..story import Report
 
 Json = dict[str, Any]
 

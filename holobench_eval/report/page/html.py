@@ -23,8 +23,8 @@ from markupsafe import Markup
 
 from ...core.io import write_atomically
 from ..markdown import blocks, captions
-from ..section import Report
-from ..sections import sections
+from ..story import Report
+from ..stories import parts
 from ..sections.answer import counts
 from ..sections.setup import environment
 from .data import page_data
@@ -97,7 +97,7 @@ def section_html(report: Report, name: str) -> Markup:
 
     Columns of numbers get a class, since the policy takes no style of an element.
     """
-    chosen = [section for section in sections() if section.name == name and section.applies(report)]
+    chosen = [section for section in parts() if getattr(section, "name", "") == name and section.applies(report)]
     text = blocks(block for section in chosen for block in section.render(report, []))
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
     tokens = reader.parse(_LINK.sub(r"\1 (\2)", str(text)))

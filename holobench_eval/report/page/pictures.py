@@ -15,7 +15,7 @@ from ...core.io import write_atomically
 from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.tiles import spread
 from ..data.results import Results
-from ..section import Report
+from ..story import Report
 from .data import Json
 
 TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit

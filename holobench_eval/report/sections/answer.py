@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..answers import kind_of
+from ..stories import answer, story_of
 from ..answers.limits import FIRST, limits
 from ..data.results import Results
 from ..data.tables import DONE
@@ -12,16 +12,16 @@ from ..section import Blocks, Figures, Report, Section
 
 
 def _title(report: Report, _: Figures) -> Blocks:
-    return [heading(report.layout.title, 1), beginning(report.layout.question or kind_of(report.results).question)]
+    return [heading(report.layout.title, 1), beginning(report.layout.question or story_of(report.results).QUESTION)]
 
 
 def _answer(report: Report, _: Figures) -> Blocks:
     yield heading("Answer")
-    yield bullets(kind_of(report.results).answer(report.results))
+    yield bullets(answer(report.results))
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
-    found = limits(report, kind_of(report.results))
+    found = limits(report, story_of(report.results))
     more = Markdown("[{} more](details.md#limits)").format(len(found) - FIRST)
     yield heading("Limits")
     yield bullets([*found[:FIRST], *([more] if len(found) > FIRST else [])])
@@ -31,7 +31,7 @@ def _more_limits(report: Report, _: Figures) -> Blocks:
     yield heading("Limits")
     if report.layout.would_change:
         yield Markdown("**What would change the answer.** {}").format(report.layout.would_change)
-    yield bullets(limits(report, kind_of(report.results))[FIRST:])
+    yield bullets(limits(report, story_of(report.results))[FIRST:])
 
 
 def _reproduce(report: Report, _: Figures) -> Blocks:

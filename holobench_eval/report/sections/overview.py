@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..answers import budget, kind_of
+from ..answers import budget
 from ..answers.kind import subjects
 from ..charts import paired
 from ..charts.curves import draw_costs
@@ -19,6 +19,7 @@ from ..data import over_displays
 from ..data.board import board
 from ..data.error_budget import budgets
 from ..data.results import Results
+from ..stories import story_of
 from ..section import Blocks, Figures, Report, Section
 
 PICTURES = "answer-pictures.jpg"
@@ -27,7 +28,7 @@ MOST_TILES = 6  # in the row of pictures, beside the target
 
 
 def _table(report: Report, _: Figures) -> Blocks:
-    yield kind_of(report.results).table(board(report.results))
+    yield story_of(report.results).table(board(report.results))
 
 
 def _plot(report: Report) -> Iterator[tuple[Path, str]]:
@@ -130,7 +131,7 @@ def _spends(results: Results) -> bool:
 
 
 def _is_budget(report: Report) -> bool:
-    return _spends(report.results) and kind_of(report.results) is budget.KIND
+    return _spends(report.results) and story_of(report.results).KIND is budget.KIND
 
 
 def _costs(report: Report) -> Iterator[tuple[Path, str]]:
@@ -153,7 +154,7 @@ SECTIONS = (
     ),
     Section("error budget", 5, figures=_budgets),
     Section(
-        "pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, lambda: _pictures(report))
+        "pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)
     ),
     Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
     Section("stages", 90, figures=_stages, details=True),

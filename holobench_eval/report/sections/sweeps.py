@@ -71,6 +71,6 @@ SECTIONS = (
         "pictures along the changes",
         46,
         applies=lambda report: bool(_drawable(report)),
-        figures=lambda report: report.pictures("sweep-*.jpg", lambda: _pictures(report)),
+        figures=lambda report: report.pictures("sweep-*.jpg", _pictures),
     ),
 )
