@@ -13,7 +13,8 @@ from ..data.results import Results
 from ..data.sweeps import SMALL, Sweep, sweeps
 from ..data.text import grouped, percent, words
 from ..markdown import Markdown, table_of
-from .kind import Kind, subjects
+from ..story import subjects
+from .kind import Kind
 
 REMEDIES = {"eye": ("corrected_eye", "known_eye")}  # kinds whose changes others are meant to undo
 
