@@ -11,10 +11,10 @@ from typing import Any
 
 from ...core.errors import listed
 from ...display.estimates import QUANTITIES
-from ..data.over_displays import is_many
 from ..data.trainings import Training
 from ..markdown import Markdown, bullets, heading, table_of
 from ..section import Blocks, Figures, Report, Section
+from ..story import is_many
 
 COLOURS = ("red", "green", "blue")
 MOST = 1e12  # no quantity is anywhere near; a larger number in a stranger's file is no estimate
