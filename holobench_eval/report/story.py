@@ -84,12 +84,6 @@ class Report:
 
         return sweeps(self.results)
 
-    @cached_property
-    def ranks(self) -> Any:
-        from .data.ranks import ranks
-
-        return ranks(self.results)
-
 
 @dataclass(frozen=True)
 class Part:
