@@ -78,12 +78,6 @@ class Report:
 
         return trainings(self.layout, self.records, self.output)
 
-    @cached_property
-    def sweeps(self) -> Any:
-        from .data.sweeps import sweeps
-
-        return sweeps(self.results)
-
 
 @dataclass(frozen=True)
 class Part:

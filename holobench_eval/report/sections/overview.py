@@ -131,7 +131,7 @@ def _spends(results: Results) -> bool:
 
 
 def _is_budget(report: Report) -> bool:
-    return _spends(report.results) and story_of(report.results).KIND is budget.KIND
+    return _spends(report.results) and getattr(story_of(report.results), "KIND", None) is budget.KIND
 
 
 def _costs(report: Report) -> Iterator[tuple[Path, str]]:

@@ -78,7 +78,7 @@ class Ranks:
 
     @cached_property
     def pairs(self) -> pd.DataFrame:
-        """Every two ranked methods, the nominally better one first: by how much it is better nominally and in each draw,
+        """Every two ranked methods, the nominally better one first: by how much it is, nominally and in each draw,
         and in how many draws the order is the other way; a tie is no order."""
         rows = []
         for first, second in itertools.combinations(self.quality, 2):
