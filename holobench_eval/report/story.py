@@ -47,7 +47,9 @@ class Report:
             self._known[make] = make(self)
         return cast(T, self._known[make])
 
-    def pictures(self, pattern: str, draw: Callable[[Report], Iterable[tuple[Path, str]]]) -> Iterable[tuple[Path, str]]:
+    def pictures(
+        self, pattern: str, draw: Callable[[Report], Iterable[tuple[Path, str]]]
+    ) -> Iterable[tuple[Path, str]]:
         """(file, caption) of figures made of pictures: drawn, or those of ``pattern`` that an earlier report left."""
         if not self.keeps_pictures:
             return draw(self)

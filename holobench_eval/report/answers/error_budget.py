@@ -8,12 +8,12 @@ import numpy as np
 
 from ..data.board import Board
 from ..data.error_budget import Budget, Part, budgets
-from ..data.over_displays import is_many
 from ..data.results import Results
 from ..data.scores import Score
 from ..data.statistics import Array
 from ..data.text import bracketed, percent, words
 from ..markdown import Markdown, table_of
+from ..story import is_many
 from .kind import Kind
 
 

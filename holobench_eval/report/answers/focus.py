@@ -9,7 +9,8 @@ from ..data.phrases import difference, marked, tested, value, verdict
 from ..data.results import Results
 from ..data.text import number
 from ..markdown import Markdown, table_of
-from .kind import Kind, subjects
+from ..story import subjects
+from .kind import Kind
 
 
 def verdicts(results: Results) -> Iterator[str]:

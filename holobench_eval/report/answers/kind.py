@@ -9,9 +9,9 @@ from ..data.board import Board
 from ..data.results import Results
 from ..markdown import Markdown
 from ..stories import MOST_WORDS as MOST_WORDS
+from ..stories.comparison import table as board_table
 from ..story import mentioned as mentioned
 from ..story import subjects as subjects
-from .board import board_table
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,13 @@ FIRST = 5  # that stand in report.md; the others are in details.md
 
 def limits(report: Report, kind: Any) -> list[Markdown]:
     """The items of the list, each with its name in bold, what matters most first."""
-    texts = [*remarks(report.results), *_sample(report), *_form(report), *getattr(kind, "LIMITS", ()), *_displays(report)]
+    texts = [
+        *remarks(report.results),
+        *_sample(report),
+        *_form(report),
+        *getattr(kind, "LIMITS", ()),
+        *_displays(report),
+    ]
     texts += [f"Measured: {report.layout.text.caution}"] * bool(report.layout.text.caution)
     texts += [f"Published: {report.layout.reported_source}."] * bool(report.layout.reported_source)
     texts += [f"Note: {report.layout.note}"] * bool(report.layout.note)

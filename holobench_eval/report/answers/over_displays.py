@@ -10,7 +10,8 @@ from ..data.results import Results
 from ..data.statistics import cause
 from ..data.text import words
 from ..markdown import Markdown, table_of
-from .kind import Kind, subjects
+from ..story import subjects
+from .kind import Kind
 
 MOST = 2  # methods that the answer names beside those of the question
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from ...metrics.control import MOST
 from ..data.board import Board
-from ..data.over_displays import is_many
 from ..data.phrases import tested, value, verdict
 from ..data.results import Results
 from ..data.text import grouped, words
 from ..markdown import Markdown, table
-from .board import board_table
-from .kind import Kind, subjects
+from ..stories.comparison import table as board_table
+from ..story import is_many, subjects
+from .kind import Kind
 
 
 def verdicts(results: Results) -> Iterator[str]:

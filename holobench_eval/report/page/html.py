@@ -23,10 +23,10 @@ from markupsafe import Markup
 
 from ...core.io import write_atomically
 from ..markdown import blocks, captions
-from ..story import Report
-from ..stories import parts
 from ..sections.answer import counts
 from ..sections.setup import environment
+from ..stories import parts
+from ..story import Report
 from .data import page_data
 from .pictures import pictures
 

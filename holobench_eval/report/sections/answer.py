@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..stories import answer, story_of
 from ..answers.limits import FIRST, limits
 from ..data.results import Results
 from ..data.tables import DONE
 from ..data.text import FILES
 from ..markdown import Markdown, beginning, bullets, code_block, heading
 from ..section import Blocks, Figures, Report, Section
+from ..stories import answer, story_of
 
 
 def _title(report: Report, _: Figures) -> Blocks:

@@ -7,10 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..answers import budget
-from ..answers.kind import subjects
 from ..charts import paired
-from ..charts.curves import draw_costs
 from ..charts.error_budget import draw_budgets
 from ..charts.family import draw_map
 from ..charts.look.methods import looks
@@ -19,8 +16,9 @@ from ..data import over_displays
 from ..data.board import board
 from ..data.error_budget import budgets
 from ..data.results import Results
-from ..stories import story_of
 from ..section import Blocks, Figures, Report, Section
+from ..stories import comparison, story_of
+from ..story import subjects
 
 PICTURES = "answer-pictures.jpg"
 MOST_METHODS = 5  # in the map
@@ -28,7 +26,7 @@ MOST_TILES = 6  # in the row of pictures, beside the target
 
 
 def _table(report: Report, _: Figures) -> Blocks:
-    yield story_of(report.results).table(board(report.results))
+    yield getattr(story_of(report.results), "table", comparison.table)(board(report.results))
 
 
 def _plot(report: Report) -> Iterator[tuple[Path, str]]:
@@ -125,45 +123,13 @@ def _budgets(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _spends(results: Results) -> bool:
-    known = results.layout.spends_captures and not results.layout.predicts and "total_captures" in results.table
-    return known and not over_displays.is_many(results) and bool((results.table["total_captures"] > 0).any())
-
-
-def _is_budget(report: Report) -> bool:
-    return _spends(report.results) and getattr(story_of(report.results), "KIND", None) is budget.KIND
-
-
-def _costs(report: Report) -> Iterator[tuple[Path, str]]:
-    """Quality against the photographs that it cost."""
-    results, path = report.results, report.figures / "quality-captures.png"
-    axis = f"{results.headline.axis}{results.layout.text.axis}"
-    displays = [each for each in board(results).displays if any(row.photographs for row in each.rows)]
-    draw_costs(path, displays, results.names, looks(results.names), axis)
-    yield (
-        path,
-        f"{axis}, against all photographs of a row: those of its training once, and those of every target. Lines join "
-        "the rows of a method. Bars: 95 % interval of the difference to the baseline.",
-    )
-
-
 SECTIONS = (
     Section("overview", 3, _table, applies=_has_scores),
     Section(
         "plot", 4, applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget", figures=_plot
     ),
     Section("error budget", 5, figures=_budgets),
-    Section(
-        "pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)
-    ),
+    Section("pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
     Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
     Section("stages", 90, figures=_stages, details=True),
-    Section("budget, drawn", 44, applies=_is_budget, figures=_costs),
-    Section(
-        "cost",
-        40,
-        applies=lambda report: _spends(report.results) and not _is_budget(report) and not report.results.done.empty,
-        figures=_costs,
-        details=True,
-    ),
 )

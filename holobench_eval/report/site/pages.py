@@ -13,10 +13,10 @@ from ...core import plugins
 from ...core.errors import UserError
 from ...display.simulated.profile import load_profile, names
 from ...display.simulated.shelf import installed
-from ..answers.comparison import of_display
 from ..data.board import Board, Display, Row, board
 from ..data.results import Results
 from ..data.text import grouped
+from ..stories.comparison import of_display
 from .pictures import STAGES, Picture
 
 BOARD = "board"  # the key of a provenance that says whether a study enters the pages of displays

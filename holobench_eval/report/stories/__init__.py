@@ -36,14 +36,18 @@ def _unmoved() -> Iterator[Any]:
     from .. import answers, sections
 
     orders = {"error_budget": 10, "prediction": 30, "focus": 40, "ranks": 50, "sweeps": 60, "over_displays": 70}
-    orders |= {"ablation": 80, "budget": 90, "comparison": 100}
     for module in iter_modules(answers.__path__):
         if module.name in orders:
             file, order = import_module(f"{answers.__name__}.{module.name}"), orders[module.name]
-            for kind, place in ((file.KIND, order), *([(file.ON_A_NETWORK, 20)] if hasattr(file, "ON_A_NETWORK") else [])):
+            for kind, place in ((file.KIND, order),):
                 yield SimpleNamespace(
-                    ORDER=place, QUESTION=kind.question, applies=kind.applies, verdicts=kind.verdicts, table=kind.table,
-                    LIMITS=kind.limits, KIND=kind,
+                    ORDER=place,
+                    QUESTION=kind.question,
+                    applies=kind.applies,
+                    verdicts=kind.verdicts,
+                    table=kind.table,
+                    LIMITS=kind.limits,
+                    KIND=kind,
                 )
     for module in iter_modules(sections.__path__):
         file = import_module(f"{sections.__name__}.{module.name}")
