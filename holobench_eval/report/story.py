@@ -73,13 +73,6 @@ class Report:
         """Pictures of targets and captures."""
         return Thumbnails(self.results, self.output)
 
-    # Until their stories are moved: then `report.once(trainings)` and the like.
-    @cached_property
-    def trainings(self) -> Any:
-        from .data.trainings import trainings
-
-        return trainings(self.layout, self.records, self.output)
-
 
 @dataclass(frozen=True)
 class Part:

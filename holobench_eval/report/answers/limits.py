@@ -13,6 +13,7 @@ from ..data.statistics import FEWEST, SIGNIFICANCE
 from ..data.text import FILES, grouped, words
 from ..markdown import Markdown
 from ..section import Report
+from ..stories.training import trainings
 from ..story import subjects
 
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
@@ -45,7 +46,7 @@ def _sample(report: Report) -> Iterator[str]:
     results = report.results
     targets, clusters = len(results.targets), len(set(results.clusters))
     among = f" in {clusters} cluster{'s' * (clusters > 1)}" if clusters < targets else ""
-    trained = ", nor with another training" * bool(report.trainings)
+    trained = ", nor with another training" * bool(report.once(trainings))
     parts = [
         f"{targets} target{'s' * (targets != 1)}{among}; brackets are of how a mean varies with other pictures of the "
         f"kind, not with other displays{trained}."
@@ -102,8 +103,8 @@ def _tuned(report: Report) -> Iterator[str]:
 def _weights(report: Report) -> Iterator[str]:
     """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
     lacking = list[tuple[tuple[str, ...], str]]()
-    for training in report.trainings:
-        files = (training.fact("description") or {}).get("external") or {}
+    for training in report.once(trainings):
+        files = training.fact("description", dict, {}).get("external") or {}
         absent = tuple(name for name, digest in files.items() if digest == "absent")
         lacking += [(absent, label) for label in training.labels if absent and label in subjects(report.results)]
     for absent, labels in grouped(dict.fromkeys(lacking)).items():
