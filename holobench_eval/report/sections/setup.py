@@ -11,7 +11,7 @@ from ..data.results import Results
 from ..data.text import FILES, plain
 from ..markdown import Markdown, bullets, code, code_block, heading, properties, table
 from ..section import Blocks, Figures, Report, Section
-from .alignment import agreement
+from ..stories.alignment import agreement
 
 TARGETS_NAMED = 40
 
