@@ -73,25 +73,6 @@ class Report:
         """Pictures of targets and captures."""
         return Thumbnails(self.results, self.output)
 
-    # Until their stories are moved: then `report.once(trainings)` and the like.
-    @cached_property
-    def trainings(self) -> Any:
-        from .data.trainings import trainings
-
-        return trainings(self.layout, self.records, self.output)
-
-    @cached_property
-    def sweeps(self) -> Any:
-        from .data.sweeps import sweeps
-
-        return sweeps(self.results)
-
-    @cached_property
-    def ranks(self) -> Any:
-        from .data.ranks import ranks
-
-        return ranks(self.results)
-
 
 @dataclass(frozen=True)
 class Part:

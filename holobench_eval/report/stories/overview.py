@@ -22,9 +22,10 @@ from ..data.statistics import FEWEST, POWER, SIGNIFICANCE
 from ..data.tables import DONE
 from ..data.text import FILES, grouped, plain, sample, words
 from ..markdown import Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
-from ..sections.alignment import agreement
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
 from . import answer, comparison, many_displays, story_of
+from .alignment import agreement
+from .training import trainings
 
 ORDER = 0
 PICTURES = "answer-pictures.jpg"
@@ -113,7 +114,7 @@ def limits(report: Report) -> list[Markdown]:
 
 def _sample(report: Report) -> str:
     results, targets = report.results, len(report.results.targets)
-    trained = ", nor with another training" * bool(report.trainings)
+    trained = ", nor with another training" * bool(report.once(trainings))
     size = f"{targets} target{'s' * (targets != 1)}{_among(results)}"
     kind = "of how a mean varies with other pictures of the kind, not with other displays"
     parts = [f"{size}; brackets are {kind}{trained}."]
@@ -174,8 +175,8 @@ def _tuned(report: Report) -> Iterator[str]:
 def _weights(report: Report) -> Iterator[str]:
     """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
     lacking = dict[tuple[tuple[str, ...], str], None]()
-    for training in report.trainings:
-        files = (training.fact("description") or {}).get("external") or {}
+    for training in report.once(trainings):
+        files = training.fact("description", dict, {}).get("external") or {}
         absent = tuple(name for name, digest in files.items() if digest == "absent")
         asked = [label for label in training.labels if absent and label in subjects(report.results)]
         lacking |= {(absent, label): None for label in asked}
