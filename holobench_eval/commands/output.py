@@ -70,12 +70,12 @@ def write_report(
 
 def print_headline(console: Console, results: Results) -> None:
     """Print the board of every display unless there are many, in 80 columns; and what is odd about phases."""
-    from ..report.data import over_displays
+    from ..report.stories import many_displays
     from ..report.data.board import board
     from ..report.data.phrases import remarks
 
     drawn = board(results)
-    for display in [] if over_displays.applies(results) else drawn.displays:
+    for display in [] if many_displays.applies(results) else drawn.displays:
         console.print(board_of(drawn, display))
     for remark in remarks(results):
         console.print(remark, style="yellow", markup=False, soft_wrap=True)

@@ -8,20 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ..charts import paired
-from ..charts.error_budget import draw_budgets
-from ..charts.family import draw_map
-from ..charts.look.methods import looks
 from ..charts.tiles import draw_rows
-from ..data import over_displays
 from ..data.board import board
-from ..data.error_budget import budgets
 from ..data.results import Results
 from ..section import Blocks, Figures, Report, Section
-from ..stories import comparison, story_of
-from ..story import subjects
+from ..stories import comparison, many_displays, story_of
+from ..story import is_many, subjects
 
 PICTURES = "answer-pictures.jpg"
-MOST_METHODS = 5  # in the map
 MOST_TILES = 6  # in the row of pictures, beside the target
 
 
@@ -30,18 +24,14 @@ def _table(report: Report, _: Figures) -> Blocks:
 
 
 def _plot(report: Report) -> Iterator[tuple[Path, str]]:
-    """Differences to the baseline over many displays, or else on the first display that has any."""
-    if over_displays.applies(report.results) and over_displays.shown_on(report.results):
-        path = report.figures / "quality-displays.png"
-        yield path, paired.draw_over_displays(report.results, path)
-        yield from _map(report)
-        return
-    yield from _paired(report, slice(1))
+    """Differences to the baseline on the first display that has any."""
+    if not (many_displays.applies(report.results) and many_displays.shown_on(report.results)):
+        yield from _paired(report, slice(1))
 
 
 def _other_plots(report: Report) -> Iterator[tuple[Path, str]]:
     """The differences on the displays after the first."""
-    if not over_displays.is_many(report.results):
+    if not is_many(report.results):
         yield from _paired(report, slice(1, None))
 
 
@@ -50,21 +40,6 @@ def _paired(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
     for condition, stem in paired.displays(report.results)[some]:
         path = report.figures / f"quality-paired-{stem}.png"
         yield path, paired.draw(report.results, condition, path)
-
-
-def _map(report: Report) -> Iterator[tuple[Path, str]]:
-    """Margins against what an error budget of the displays found, of the best methods and those of the question."""
-    results = report.results
-    if found := over_displays.display_map(results):
-        wanted = [*subjects(results), *(label for label in found.labels[1:] if label not in subjects(results))]
-        looked, path = looks(results.names), report.figures / "quality-map.png"
-        axis = f"difference to {results.layout.baseline} in {results.headline.axis}"
-        draw_map(path, found, axis, {label: looked[label] for label in wanted[:MOST_METHODS]})
-        yield (
-            path,
-            f"Differences to {results.layout.baseline}, a mark a display, against two parts of its error, as error "
-            "budgets of the displays found them. Lines: least squares, for the eye.",
-        )
 
 
 def _stages(report: Report) -> Iterator[tuple[Path, str]]:
@@ -110,25 +85,11 @@ def _has_scores(report: Report) -> bool:
     return bool(report.results.conditions) and values is not None and bool(np.isfinite(values).any())
 
 
-def _budgets(report: Report) -> Iterator[tuple[Path, str]]:
-    """Where the error of captures comes from."""
-    if found := budgets(report.results):
-        path = report.figures / "error-budget.png"
-        draw_budgets(path, found)
-        yield (
-            path,
-            "The error budget. Left: parts of the squared error of the captures, by display, with their PSNR. Right: "
-            "what removing a part and all parts to its left would gain at most, with its 95 % interval over clusters; "
-            "for temporal noise, what captures with no other error would gain.",
-        )
-
-
 SECTIONS = (
     Section("overview", 3, _table, applies=_has_scores),
     Section(
         "plot", 4, applies=lambda report: _has_scores(report) and report.layout.measure != "error_budget", figures=_plot
     ),
-    Section("error budget", 5, figures=_budgets),
     Section("pictures", 6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
     Section("other plots", 30, applies=_has_scores, figures=_other_plots, details=True),
     Section("stages", 90, figures=_stages, details=True),
