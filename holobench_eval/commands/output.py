@@ -71,11 +71,11 @@ def write_report(
 def print_headline(console: Console, results: Results) -> None:
     """Print the board of every display unless there are many, in 80 columns; and what is odd about phases."""
     from ..report.board import board
-    from ..report.data import over_displays
     from ..report.phrases import remarks
+    from ..report.stories import many_displays
 
     drawn = board(results)
-    for display in [] if over_displays.applies(results) else drawn.displays:
+    for display in [] if many_displays.applies(results) else drawn.displays:
         console.print(board_of(drawn, display))
     for remark in remarks(results):
         console.print(remark, style="yellow", markup=False, soft_wrap=True)
@@ -114,10 +114,10 @@ def print_answer(console: Console, results: Results) -> None:
     The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that
     is worse than a constant image has a rank, too.
     """
-    from ..report.answers import kind_of
     from ..report.phrases import too_few
+    from ..report.stories import answer
 
-    for sentence in (*kind_of(results).answer(results), *filter(None, [too_few(results)])):
+    for sentence in (*answer(results), *filter(None, [too_few(results)])):
         console.print(f"- {sentence}", markup=False)
 
 

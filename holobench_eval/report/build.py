@@ -18,8 +18,8 @@ from .markdown import DETAILS, REPORT, Markdown, blocks
 from .page import write_page
 from .page.pictures import keep_copies
 from .results import Results, of_study, read_records, records_frame, records_text
-from .section import Report
-from .sections import sections
+from .stories import parts
+from .story import Report
 
 # Figures that a report draws itself, those of pictures from thumbnails; the stages of a bench are drawn during the run.
 OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
@@ -72,12 +72,12 @@ def write_report(
 
 def _texts(report: Report) -> dict[str, Markdown]:
     """The text of each file, by its name."""
-    numbers, parts = itertools.count(1), dict[str, list[object]]({REPORT: [], DETAILS: []})
-    for section in sections():
-        if section.applies(report):
-            drawn = [_figure(next(numbers), path, caption) for path, caption in section.figures(report)]
-            parts[DETAILS if section.details else REPORT] += section.render(report, drawn)
-    return {name: blocks(text) for name, text in parts.items()}
+    numbers, content = itertools.count(1), dict[str, list[object]]({REPORT: [], DETAILS: []})
+    for part in parts():
+        if part.applies(report):
+            drawn = [_figure(next(numbers), path, caption) for path, caption in part.figures(report)]
+            content[DETAILS if part.details else REPORT] += part.render(report, drawn)
+    return {name: blocks(text) for name, text in content.items()}
 
 
 def _figure(number: int, path: Path, caption: str) -> Markdown:
@@ -104,7 +104,7 @@ def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
     """Draw the charts of a report for one of ``MEDIA`` into a folder, none of those made of pictures; every file."""
     printed = replace(report, keeps_pictures=True, drawn=folder)
     with drawn_for(MEDIA[medium]):
-        for section in sections():
-            if section.applies(printed):
-                for path, _ in section.figures(printed):
+        for part in parts():
+            if part.applies(printed):
+                for path, _ in part.figures(printed):
                     yield from (path.with_suffix(suffix) for suffix in MEDIA[medium].suffixes)

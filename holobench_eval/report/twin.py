@@ -25,8 +25,8 @@ from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
-from .sections.diagnosis import quantities
 from .statistics import Estimate, mean_interval
+from .stories.training import quantities
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"

@@ -23,7 +23,7 @@ def figure(
     from ...report import Results, facts_of, records_frame
     from ...report.build import print_figures, related
     from ...report.description import describe
-    from ...report.section import Report
+    from ...report.story import Report
 
     study, records, folder, known, _ = load(config, output)
     facts = facts_of(study)

@@ -8,13 +8,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from ...display.simulated.changes import KINDS
 from ...study.artifacts import Round
 from ..board import Display, Row
-from ..data.sweeps import Sweep
 from ..facts import ORACLE
+from ..results import Results
 from .look.medium import medium
 from .look.methods import Look, looks
 from .style import GREY, SHADES, grid, laid_out, legend_below, marks, save, stacked, style, without_math
@@ -52,12 +54,16 @@ def draw_costs(
         save(figure, path)
 
 
-def draw_sweep(path: Path, sweeps: Sequence[Sweep], quality: str) -> None:
-    """Draw a change of displays, a panel a display: a curve a method, or dots where the change has no axis."""
+def draw_sweep(path: Path, results: Results, points: pd.DataFrame, quality: str) -> None:
+    """Draw a change of displays, a panel a display: a curve a method, or dots where the change has no axis.
+
+    points: of one kind, with their display, method, value and its text, condition and loss.
+    """
     with style():
-        figure, drawn = stacked([sweep.swept.before for sweep in sweeps], [SWEEP] * len(sweeps), FOOTER)
-        for axes, sweep in zip(drawn, sweeps, strict=True):
-            _draw_sweep(axes, sweep)
+        panels = dict(iter(points.groupby("display", sort=False)))
+        figure, drawn = stacked([str(name) for name in panels], [SWEEP] * len(panels), FOOTER)
+        for axes, each in zip(drawn, panels.values(), strict=True):
+            _draw_sweep(axes, results, each)
             _finish(axes, quality)
         save(figure, path)
 
@@ -102,18 +108,18 @@ def _draw_costs(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looke
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
 
 
-def _draw_sweep(axes: Axes, sweep: Sweep) -> None:
+def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
     """Means, slightly apart from each other, with bars for their differences to the unchanged display."""
-    kind, results, points = sweep.kind, sweep.results, sweep.points
+    kind, curves = KINDS[points["kind"].iloc[0]], dict(iter(points.groupby("method", sort=False)))
+    places = points.drop_duplicates("text")
     looked, better = looks(results.names), results.headline.sign
-    positions = np.array([float(value) if kind.numeric else index for index, (value, _) in enumerate(points)])
+    positions = places["value"].to_numpy(np.float64) if kind.numeric else np.arange(len(places))
     apart = np.ptp(positions) / 250 if kind.numeric else 0.07
-    for index, label in enumerate(sweep.methods):
-        losses = [sweep.loss(label, name) if name != sweep.swept.before else None for _, name in points]
+    for index, (label, curve) in enumerate(curves.items()):
         axes.errorbar(
-            positions + (index - (len(sweep.methods) - 1) / 2) * apart,
-            [results.values(label, name).mean() for _, name in points],
-            yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in losses]),
+            positions + (index - (len(curves) - 1) / 2) * apart,
+            [results.values(label, name).mean() for name in curve["condition"]],
+            yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in curve["loss"]]),
             color=looked[label].colour,
             **marks(looked[label], 6.5),
             linewidth=1.5 if kind.numeric else 0,
@@ -122,12 +128,12 @@ def _draw_sweep(axes: Axes, sweep: Sweep) -> None:
             capsize=2,
             label=label,
         )
-    if (floor := results.floor(sweep.swept.before)) is not None:
+    if (floor := results.floor(points["display"].iloc[0])) is not None:
         axes.axhline(floor, color=GREY, linewidth=1.1, linestyle=(0, (3, 3)), zorder=1, label="a gray picture")
     if kind.nominal is not None:
         axes.axvline(kind.nominal, color="black", linewidth=0.8, linestyle=":")
     if not kind.numeric:
-        axes.set_xticks(positions, [sweep.text(value) for value, _ in points], parse_math=False)
+        axes.set_xticks(positions, list(places["text"]), parse_math=False)
     axes.set_xlabel(medium().wrap(f"{kind.words}{f' [{kind.unit}]' if kind.unit else ''}", 0.6 * medium().width))
     axes.margins(x=0.03)
 

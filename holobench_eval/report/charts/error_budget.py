@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
-from ..data.error_budget import Budget, Part
 from .look.medium import medium
 from .style import PALE, grid, laid_out, legend_below, note, save, style
 
@@ -23,8 +23,8 @@ NESTED = matplotlib.colormaps["cividis"]  # of nested models, from small to larg
 DARKEST, LIGHTEST = 0.1, 0.9  # of the part of it that is used
 
 
-def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
-    """Draw the budgets of displays."""
+def draw_budgets(path: Path, budgets: Sequence[Any]) -> None:
+    """Draw the budgets of displays, see ``stories.error_budget.Budget``."""
     colours = _colours(budgets)
     with style():
         narrow = medium().narrow
@@ -53,7 +53,7 @@ def draw_budgets(path: Path, budgets: Sequence[Budget]) -> None:
         save(figure, path)
 
 
-def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
+def _colours(budgets: Sequence[Any]) -> Mapping[str, str]:
     """Of every part by its label, in the order of the bars."""
     labels = dict.fromkeys(part.label for budget in budgets for part in budget.explained)
     shades = np.linspace(DARKEST, LIGHTEST, len(labels))
@@ -61,7 +61,7 @@ def _colours(budgets: Sequence[Budget]) -> Mapping[str, str]:
     return explained | {budgets[0].rest.label: REST, budgets[0].noise.label: NOISE}
 
 
-def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
+def _shares(axes: Axes, row: int, budget: Any, colours: Mapping[str, str]) -> None:
     """The parts side by side from zero on; negative ones to its left, hatched."""
     right = left = 0.0
     for part in budget.parts:
@@ -77,9 +77,9 @@ def _shares(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) ->
         right, left = (right + share, left) if share >= 0 else (right, left + share)
 
 
-def _gains(axes: Axes, row: int, budget: Budget, colours: Mapping[str, str]) -> None:
+def _gains(axes: Axes, row: int, budget: Any, colours: Mapping[str, str]) -> None:
     """A mark with its interval for each link of the chain, from above to below, and one for the noise alone."""
-    links: list[Part] = [*budget.explained, budget.noise]
+    links = [*budget.explained, budget.noise]
     heights = row + np.linspace(-0.3, 0.3, len(links))
     for part, height in zip(links, heights, strict=True):
         if part.gain is None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from ...study.calibration.family import Range, Row
-from ..data.over_displays import Map
 from .look.medium import medium
 from .look.methods import Look
 from .style import PALE, grid, laid_out, legend_below, new_figure, save, style
@@ -55,22 +55,23 @@ def _named(given: Range) -> str:
     return f"{words}\n[{given.unit}]" if given.unit else words
 
 
-def draw_map(path: Path, found: Map, axis: str, looked: Mapping[str, Look]) -> None:
-    """Draw the margins of some methods against each share of a map, a mark a display, with a line for the eye.
+def draw_map(path: Path, shares: pd.DataFrame, margins: pd.DataFrame, axis: str, looked: Mapping[str, Look]) -> None:
+    """Draw the margins of some methods against each share of an error [%], a mark a display, with a line for the eye.
 
-    axis: name of the margins; looked: the look of the methods by label.
+    shares, margins: a row a display, a column a share or a method; axis: name of the margins; looked: the look of the
+    methods that are drawn, by label.
     """
     with style():
         width, across = medium().width, 1 if medium().narrow else 2
         height = round(width * (1.9 if medium().narrow else 0.55))
         figure, panels = laid_out(width, height, 2 // across, across, sharey=True)
-        for axes, shares, name in zip(panels.flat, 100 * found.shares.T, found.axes, strict=True):
+        for axes, (name, share) in zip(panels.flat, shares.items(), strict=True):
             for label, look in looked.items():
-                values = found.margins[found.labels.index(label)]
+                values = margins[label]
                 given = {"marker": look.marker, "color": look.face, "edgecolor": look.colour}
-                axes.scatter(shares, values, s=30 * medium().scale ** 2, label=label, **given)
-                ends = np.array([shares.min(), shares.max()])
-                axes.plot(ends, np.polyval(np.polyfit(shares, values, 1), ends), color=look.colour, linewidth=1)
+                axes.scatter(share, values, s=30 * medium().scale ** 2, label=label, **given)
+                ends = np.array([share.min(), share.max()])
+                axes.plot(ends, np.polyval(np.polyfit(share, values, 1), ends), color=look.colour, linewidth=1)
             axes.axhline(0, color="black", linewidth=1)
             axes.set_xlabel(medium().wrap(f"error explained by {name} [%]", 0.84 * width / across), parse_math=False)
             grid(axes)

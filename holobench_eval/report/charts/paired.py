@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..data import over_displays
 from ..results import Results
 from ..scores import Score
 from ..statistics import Array, Estimate
@@ -50,7 +49,7 @@ def draw(results: Results, condition: str, path: Path) -> str:
     floor = results.floor(condition, less=results.values(baseline, condition))
     lines = {} if floor is None else {"floor: a constant image": floor}
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
-    _draw(results, path, condition, rows, lines)
+    draw_rows(results, path, condition, rows, lines)
     return (
         f"{results.headline.axis}{results.text.axis}, on {condition}: differences to the baseline "
         f"{results.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
@@ -58,21 +57,8 @@ def draw(results: Results, condition: str, path: Path) -> str:
     )
 
 
-def draw_over_displays(results: Results, path: Path) -> str:
-    """Draw the mean differences of each display, best method first; dashed: those that were published. The caption."""
-    looked, found = looks(results.names), over_displays.margins(results)
-    rows = [Row(each.label, each.values, each.over_both, looked[each.label]) for each in found]
-    known = {each.label: over_displays.published(results, each.label, results.conditions[0]) for each in found}
-    lines = {f"published for {label}": value for label, value in known.items() if value is not None}
-    _draw(results, path, f"{len(over_displays.shown_on(results))} displays", rows, lines)
-    return (
-        f"Differences to {results.baseline} in {results.headline.axis}. Small dots: displays, at the same "
-        "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets."
-    )
-
-
-def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
-    """Rows of differences to the baseline, which is a line at zero; further lines are dashed."""
+def draw_rows(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
+    """Draw rows of differences to the baseline, which is a line at zero; further lines are dashed."""
     baseline, score = results.baseline, results.headline
     better = "right" if score.higher_is_better else "left"
     axis = f"difference to {baseline} in {score.axis}{results.text.axis}; better: to the {better}"

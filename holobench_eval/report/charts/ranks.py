@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from ..data.ranks import Ranks
+from ..statistics import Array, Estimate
 from ..text import bracketed
 from .look.medium import medium
 from .style import GREY, PALE, grid, new_figure, save, style
@@ -22,36 +23,39 @@ SHADES = LinearSegmentedColormap.from_list("shares", [(0.0, "white"), (1.0, "#22
 DARK = 0.55  # share from which on figures in a cell are white
 
 
-def draw_ranks(path: Path, ranks: Ranks) -> None:
-    """Draw the places of the methods and the agreement of the draws side by side."""
+def draw_ranks(path: Path, title: str, ranks: pd.DataFrame, taus: Array, mean: Estimate) -> None:
+    """Draw the places of the methods and the agreement of the draws side by side.
+
+    ranks: a column a method, the nominal places first, then those in each draw; taus: Kendall's tau-b of the draws
+    against the nominal places, and their mean.
+    """
     with style():
-        height = FRAME + ROW * max(4, len(ranks.methods))
+        height = FRAME + ROW * max(4, len(ranks.columns))
         figure = new_figure(medium().width, round(medium().scale * (height + AGREEMENT * medium().narrow)))
         figure.set_layout_engine("constrained", w_pad=0.08)
         if medium().narrow:
             left, right = figure.subplots(2, 1, height_ratios=[height, AGREEMENT])
         else:
             left, right = figure.subplots(1, 2, width_ratios=[5, 3])
-        figure.suptitle(
-            ranks.swept.before, x=0.01, ha="left", weight="bold", fontsize=medium().text + 1, parse_math=False
-        )
+        figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize=medium().text + 1, parse_math=False)
         _shares(left, ranks)
-        _agreement(right, ranks)
+        _agreement(right, len(ranks.columns), taus, mean)
         save(figure, path)
 
 
-def _shares(axes: Axes, ranks: Ranks) -> None:
-    shares, count = ranks.shares, len(ranks.methods)
+def _shares(axes: Axes, ranks: pd.DataFrame) -> None:
+    count = len(ranks.columns)
+    shares = np.stack([(ranks[1:] == rank).mean() for rank in range(1, count + 1)], axis=1)
     axes.imshow(shares, cmap=SHADES, vmin=0, vmax=1, aspect="auto")
     for row, column in zip(*np.nonzero(shares), strict=True):
         percent = 100 * shares[row, column]
         colour = "white" if shares[row, column] > DARK else "black"
         axes.text(column, row, f"{percent:.0f}" if percent >= 1 else "<1", ha="center", va="center", color=colour)
-    for row, position in enumerate(ranks.nominal_positions):
+    for row, position in enumerate(ranks.iloc[0]):
         axes.add_patch(
             Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
-    names = [medium().wrap(label, NAMES * medium().width) for label in ranks.methods]
+    names = [medium().wrap(label, NAMES * medium().width) for label in ranks]
     axes.set_yticks(range(count), names, parse_math=False, fontsize=medium().note)
     axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)
@@ -60,12 +64,12 @@ def _shares(axes: Axes, ranks: Ranks) -> None:
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("rank in a draw")
-    axes.set_title(f"ranks: share of {len(ranks.used)} draws [%]", loc="left")
+    axes.set_title(f"ranks: share of {len(ranks) - 1} draws [%]", loc="left")
 
 
-def _agreement(axes: Axes, ranks: Ranks) -> None:
-    mean, step = ranks.tau, max(NARROWEST, 4 / (len(ranks.methods) * (len(ranks.methods) - 1)))
-    steps, draws = np.unique(((1 - ranks.taus) / step).round(), return_counts=True)
+def _agreement(axes: Axes, methods: int, taus: Array, mean: Estimate) -> None:
+    step = max(NARROWEST, 4 / (methods * (methods - 1)))
+    steps, draws = np.unique(((1 - taus) / step).round(), return_counts=True)
     axes.bar(1 - step * steps, draws, width=min(0.8 * step, 0.1), color=PALE)
     top = 1.22 * draws.max()
     axes.errorbar(
@@ -73,7 +77,7 @@ def _agreement(axes: Axes, ranks: Ranks) -> None:
     )
     axes.set_title(f"mean tau {bracketed(mean, '.2f')}", loc="left")
     axes.axvline(0, color="black", linewidth=0.8, linestyle="--")
-    axes.set_xlim(min(0.0, ranks.taus.min()) - 0.08, 1.08)
+    axes.set_xlim(min(0.0, taus.min()) - 0.08, 1.08)
     axes.set_ylim(0, top)
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.set_ylabel("draws")

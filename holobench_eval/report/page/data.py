@@ -14,8 +14,8 @@ from ..columns import costs
 from ..phrases import counted, verdict
 from ..results import Results, to_json
 from ..scores import Score
-from ..section import Report
 from ..statistics import Estimate
+from ..story import Report
 from ..text import number
 
 Json = dict[str, Any]

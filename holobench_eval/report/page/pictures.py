@@ -16,7 +16,7 @@ from ...study.scoring.pictures import LONGEST_THUMBNAIL
 from ..charts.tiles import spread
 from ..facts import ORACLE
 from ..results import Results
-from ..section import Report
+from ..story import Report
 from .data import Json
 
 TARGETS_IN_FULL = 4  # targets with the captures of all methods where not all pictures fit
@@ -118,11 +118,7 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
     """The best method of a display, the baseline and the oracle."""
     results = report.results
     for condition in conditions:
-        roles = (
-            *results.ranking(condition)[:1],
-            results.baseline,
-            *results.ranking(condition, categories=(ORACLE,))[:1],
-        )
+        roles = (*results.ranking(condition)[:1], results.baseline, *results.ranking(condition, categories=(ORACLE,))[:1])
         for label in dict.fromkeys(role for role in roles if role in results.methods(condition)):
             yield str(label), condition, target
 

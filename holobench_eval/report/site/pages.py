@@ -13,9 +13,9 @@ from ...core import plugins
 from ...core.errors import UserError
 from ...display.simulated.profile import load_profile, names
 from ...display.simulated.shelf import installed
-from ..answers.comparison import of_display
 from ..board import Board, Display, Row, board
 from ..results import Results
+from ..stories.comparison import of_display
 from ..text import grouped
 from .pictures import STAGES, Picture
 

@@ -1,1 +1,0 @@
-"""The numbers of a report, computed from the records of a study."""

@@ -1,0 +1,58 @@
+"""Ablation: which single change of the baseline method matters, and in which direction?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..phrases import verdict
+from ..results import Results
+from ..text import grouped, words
+
+ORDER = 80
+QUESTION = "Which single change of the method matters?"
+LIMITS = (
+    "Training: each row was trained once, and the intervals do not hold what another training of the same row "
+    "would change; a row with another seed, where there is one, shows how much that is.",
+)
+FEWEST = 3  # variants of the baseline method that make a study an ablation
+NAMED = 3  # changes that the verdict lists with their differences
+
+
+def applies(results: Results) -> bool:
+    """Whether most rows are variants of the baseline."""
+    return len(_variants(results)) >= max(FEWEST, len(results.labels) / 2 - 1)
+
+
+def _variants(results: Results) -> dict[str, set[str]]:
+    """The parameters that differ from the baseline's, of the rows that are its own method with other settings; with
+    another file it shows another's phases."""
+    names, params, baseline = results.names, results.facts.methods["params"], str(results.baseline)
+    variants, own = dict[str, set[str]](), params.get(baseline, {})
+    for label in results.labels:
+        given = params.get(label, {})
+        changed = {key for key in given.keys() | own.keys() if given.get(key) != own.get(key)}
+        if label != baseline and names.get(label) == names.get(baseline) and "file" not in changed:
+            variants[label] = changed
+    return variants
+
+
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display: what lowers, raises and does not move the score, and what another seed of the training moves."""
+    score, variants = results.headline, _variants(results)
+    for condition in results.conditions:
+        tests = [test for label in variants if (test := results.tested(label, condition))]
+        reseeded = [test for test in tests if variants[test.second] == {"seed"}]
+        changes = [test for test in tests if test not in reseeded]
+        if not changes:
+            continue
+        largest = sorted(changes, key=lambda test: -abs(test.estimate.mean))
+        groups, parts = grouped((verdict(score, test), test) for test in largest), list[str]()
+        for name, effect in (("worse", "lower"), ("better", "raise")):
+            same = groups.get(name, [])
+            listed = [f"{test.second} ({score.number(test.estimate.mean, signed=True)})" for test in same[:NAMED]]
+            more = f" and {len(same) - NAMED} more" if len(same) > NAMED else ""
+            parts.append(f"{len(same) or 'none'} {effect} it{f': {words(listed)}{more}' if same else ''}")
+        moved = [score.with_unit(abs(test.estimate.mean)) for test in reseeded]
+        chance = f" Another seed moves it by {words(moved)}: what is smaller is chance." if moved else ""
+        begin = f"{condition}: " * (len(results.conditions) > 1)
+        yield f"{begin}Of {len(changes)} changes of {results.baseline}, {'; '.join(parts)}.{chance}"

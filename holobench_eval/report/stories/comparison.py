@@ -1,0 +1,188 @@
+"""Comparison of methods: what is best on each display, and is what the question names better than the baseline?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...core.errors import listed
+from ...study.folders.files import remedies
+from ..board import GROUPS, Board, Display, Row, board
+from ..facts import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
+from ..markdown import Markdown, blocks, code, heading, table_of
+from ..phrases import difference, verdict
+from ..results import Results
+from ..story import subjects
+from ..text import FILES, grouped, number, words
+
+ORDER = 100
+QUESTION = "Which method gives the better picture, and by how much?"
+NAMED = 3  # methods of one letter
+LISTED = 10  # methods, or targets of all of them
+LISTED_EACH = 3  # targets of a method
+OTHER = "{baseline}"  # the place of the baseline's name, which a verdict says once
+SIGNS = {"better": "", "worse": "", "not shown to differ": " (not shown)", "not tested": " (no test)"}
+
+
+def applies(results: Results) -> bool:
+    """A comparison of methods is what any study is."""
+    return True
+
+
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display, then which methods lack targets."""
+    drawn = board(results).displays
+    for display in drawn:
+        yield of_display(results, display, f"{display.name}: " * (len(drawn) > 1))
+    yield lacking(results)
+
+
+def of_display(results: Results, display: Display, begin: str = "") -> str:
+    """Who leads without a camera at the scored picture, with one, and what becomes of the methods of the question."""
+    complete = {group: [row for row in rows if row.scored == len(results.targets)] for group, rows in display.groups}
+    rivals = [rows for group, rows in complete.items() if rows and group not in (ONLINE, ORACLE)]
+    first = max(rivals, key=lambda rows: results.headline.sign * rows[0].score.mean, default=[])
+    named, parts = list[str](), list[str]()
+    for rows, where in (
+        (first, _among(results, first)),
+        (complete.get(OPEN_LOOP, []) if first is complete.get(CALIBRATED) else [], "without a camera "),
+        (complete.get(ONLINE, []), "with photographs of the picture itself "),
+    ):
+        if rows:
+            tied = [row.label for row in rows if row.tier == "A"][:NAMED] or [rows[0].label]
+            named += tied
+            parts.append(f"{where}{_leads(results, rows[0], tied)}")
+    for row in display.rows:
+        if row.test and row.label in subjects(results) and row.label not in named:
+            margin = published(results, row.label, display.name)
+            known = "" if margin is None else f" (published {results.headline.with_unit(margin, signed=True)})"
+            parts.append(f"{row.label} {_against(results, row)}{known}")
+    text = f"{begin}{'; '.join(parts)}." if parts else ""
+    return text.replace(OTHER, f" against {results.baseline}", 1).replace(OTHER, "")
+
+
+def _among(results: Results, rivals: list[Row]) -> str:
+    """Among whom the best row leads, where the baseline was given more of the camera or the display and is better."""
+    test = rivals[0].test if rivals else None
+    if test is None or not results.headline.better(0.0, test.estimate.mean):
+        return ""
+    knows = results.category(test.first) == ORACLE
+    return "without knowing the display " if knows else "without photographs of the picture itself "
+
+
+def _leads(results: Results, row: Row, tied: list[str]) -> str:
+    """``a and b lead, not told apart (20.05 dB), +3.00 dB [+2.80, +3.20], for 40 photographs``."""
+    apart = ", not told apart" * (len(tied) > 1)
+    gained = f", {_against(results, row)}" if row.test else ""
+    cost = f", for {number(row.photographs)} photographs" if row.photographs else ""
+    mean = results.headline.with_unit(row.score.mean)
+    return f"{words(tied)} lead{'s' * (len(tied) == 1)}{apart} ({mean}){gained}{cost}"
+
+
+def _against(results: Results, row: Row) -> str:
+    """``+1.30 dB [+0.43, +2.17]``, what it is the difference to, and whether that is shown."""
+    assert row.test is not None
+    doubts = {"not shown to differ": ", not shown", "not tested": ", untested"}
+    text = difference(results.headline, row.test.estimate)
+    return f"{text}{OTHER}{doubts.get(verdict(results.headline, row.test), '')}"
+
+
+def published(results: Results, label: str, condition: str) -> float | None:
+    """The margin of two published figures beside a display, where a method and the baseline have one."""
+    names, metric = (label, str(results.baseline)), results.headline.metric
+    own, other = (results.facts.published(name, condition).get(metric) for name in names)
+    return None if own is None or other is None else own - other
+
+
+def table(board: Board) -> Markdown | None:
+    """The board of every display, under its name where there are several: a row a method, its group above it."""
+    parts = list[object]()
+    for display in board.displays:
+        lines = list[dict[str, object]]()
+        for group, rows in display.groups:
+            own = [_line(board, display, row, group) for row in rows]
+            if len(display.groups) > 1:
+                lines.append(dict.fromkeys(own[0], "") | {"method": Markdown("**{}**").format(GROUPS[group])})
+            lines += own
+        parts += [heading(display.name, 3)] * (len(board.displays) > 1) + [table_of(lines)]
+    floors = [(each.floor, each.name) for each in board.displays if each.floor is not None]
+    known = grouped((board.results.headline.with_unit(floor), name) for floor, name in floors)
+    gray = [f"{value} on {words(names)}" if len(known) > 1 else value for value, names in known.items()]
+    note = "A letter holds the methods of a group that no test tells from its best."
+    note += f" A gray picture scores {'; '.join(gray)}." if gray else ""
+    return blocks([*parts, f"{note} Brackets: 95 % intervals."]) if board.displays else None
+
+
+def _line(board: Board, display: Display, row: Row, group: str) -> dict[str, object]:
+    score, results = board.results.headline, board.results
+    title = results.facts.of(row.label, "title")
+    name = Markdown("{} ({})").format(title, code(row.label)) if title else row.label
+    line = {"": row.tier, "method": Markdown(", ").join([name, *board.marks(row)])}
+    line[score.heading] = score.number(row.score.mean)
+    if results.baseline:
+        against = "baseline" if row.label == results.baseline else "–"
+        if row.test:
+            sign = "" if group == ORACLE else SIGNS[verdict(score, row.test)]
+            against = f"{score.estimate(row.test.estimate, signed=True)}{sign}"
+        line[f"against {results.baseline}{score.brackets}"] = against
+    line |= {each.title: each.number(value) for each, value in zip(board.beside, row.beside, strict=True)}
+    has_panel_time = any(row.panel_time is not None for row in display.rows)
+    costs = {"photographs": row.photographs} if results.facts.spends else {}
+    costs |= {"panel time [frames]": row.panel_time} if has_panel_time else {}
+    costs |= {"seconds": row.seconds, "memory [MiB]": row.memory} if results.study.measure != FILES else {}
+    return line | {cost: number(value) for cost, value in costs.items()}
+
+
+def lacking(results: Results) -> str:
+    """Who lacks which targets, and what to do about it; empty where every method has a score for every target."""
+    pairs = [(label, condition) for condition in results.conditions for label in results.methods(condition)]
+    missing = {pair: np.array(results.targets)[np.isnan(results.values(*pair))].tolist() for pair in pairs}
+    lacks = {pair: names for pair, names in missing.items() if names}
+    if not lacks:
+        return ""
+    ranked, several, total = len(pairs) - len(lacks), len(results.conditions) > 1, len(results.targets)
+    who = list[str]()
+    for (label, condition), names in lacks.items():
+        some = f"{len(names)} of {total} targets ({_first(names, LISTED_EACH)})"
+        of_all = f"all {total} targets" if total > 1 else "the target"
+        where = f" on {condition}" * several
+        who.append(f"{label}{where} lacks {of_all if len(names) == total else some}")
+    have = "1 method that has every target is" if ranked == 1 else f"{ranked} methods that have every target are"
+    state = f"Only the {have} ranked" if ranked else "No method is ranked, since none has every target"
+    common = _in_common(results, {label for label, _ in lacks}) if results.study.measure == FILES else ""
+    return f"{state}: {_first(who, LISTED)}. {_remedy(results, list(lacks.values()))}{common}"
+
+
+def _in_common(results: Results, lacks: set[str]) -> str:
+    """How given photographs of two methods differ on the targets that both have, where one of them lacks some."""
+    display, total = results.conditions[0], len(results.targets)
+    labels = sorted(results.methods(display), key=lacks.__contains__)
+    first = results.baseline or labels[0]
+    parts = []
+    for label in labels:
+        if label != first and {label, first} & lacks:
+            both = results.estimate(results.values(label, display) - results.values(first, display))
+            parts += [f"{label} {difference(results.headline, both)} on {both.n} of {total}"] if both.n else []
+    return f" Against {first}, on the targets that both have: {_first(parts, LISTED)}." if parts else ""
+
+
+def _remedy(results: Results, lacks: list[list[str]]) -> str:
+    """How all of them are ranked, or without some targets all that have any score."""
+    some = [names for names in lacks if len(names) < len(results.targets)]
+    away = [name for name in results.targets if any(name in names for names in some)]
+    left, who = len(results.targets) - len(away), "all" if len(some) == len(lacks) else "all that have any score"
+    if results.study.measure == FILES:
+        holes = results.holes[["state", "label", "target", "reason"]].astype(str)
+        way = remedies(holes.itertuples(index=False, name=None))
+        moved = f"move the targets and captures of {_first(away, LISTED)} away"
+        fewer = f"{moved} and rank {who} by the {left} target{'s' * (left > 1)} left"
+    else:
+        way = "Mend what the reasons in details.md say and run the same command again."
+        fewer = f"name the other {left} targets with --targets to rank {who} by these"
+    return f"{way[:-1]}, or {fewer}." if away and left else way
+
+
+def _first(names: list[str], most: int) -> str:
+    more = len(names) - most
+    return f"{listed(names[:most])}{f' and {more} more' if more > 0 else ''}"

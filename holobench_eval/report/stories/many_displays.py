@@ -1,0 +1,306 @@
+"""Many displays: on how many is a method better, by how much over all of them, and what decides it?
+
+The map is what a lab can measure of a display on its own, and what it tells of the methods on displays like it: a line
+in two shares of an error budget is fitted to the margins of every method, and asked of a display that it was not fitted
+to. So it is told whether the shares name the best method of a display, and what their choice costs.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ...study.calibration import value_of
+from ...study.calibration.family import load_family, names
+from ..board import Board
+from ..charts import paired
+from ..charts.family import draw_map
+from ..charts.look.methods import looks
+from ..markdown import Markdown, table_of
+from ..results import Results
+from ..statistics import FEWEST_DISPLAYS, Array, Estimate, cause, two_way
+from ..story import Part, Report, is_many, subjects
+from ..text import words
+from .comparison import published
+from .error_budget import budgets
+
+ORDER = 70
+QUESTION = "On how many of the displays is a method better than the baseline, and by how much over all of them?"
+LIMITS = (
+    "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
+    "Better and worse are shown by one family of tests over all methods and displays.",
+)
+MOST = 2  # methods that the answer names beside those of the question
+MOST_DRAWN = 5  # in the map
+
+
+def applies(results: Results) -> bool:
+    """Whether a study compares methods, and not only oracles, with a baseline over many displays."""
+    compared = {*results.labels} - {*results.facts.oracles, results.baseline}
+    return is_many(results) and not results.facts.predicts and results.baseline is not None and bool(compared)
+
+
+def shown_on(results: Results) -> list[str]:
+    """The displays on which every method that is compared has a score for every target."""
+    rows = [label for label in results.labels if label not in results.facts.oracles]
+    return [name for name in results.conditions if all(results.is_complete(label, name) for label in rows)]
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A method minus the baseline. values: ``(displays,)`` means over targets; over_both: their mean, with an interval
+    over displays and clusters of targets together; better, worse: displays on which the family of tests shows it."""
+
+    label: str
+    values: Array
+    over_both: Estimate
+    better: int
+    worse: int
+
+    @property
+    def median(self) -> float:
+        """Over displays."""
+        return float(np.median(self.values))
+
+    @property
+    def spread(self) -> Array:
+        """The 5 and 95 % quantiles over displays."""
+        return np.quantile(self.values, (0.05, 0.95))
+
+
+def margins(results: Results) -> list[Margin]:
+    """Every method but the baseline and oracles, the best first."""
+    where, sign, baseline = shown_on(results), results.headline.sign, str(results.baseline)
+    clusters, index = np.unique(results.clusters, return_inverse=True)
+    shares = np.eye(len(clusters))[index] / np.bincount(index)
+    rows = list[Margin]()
+    for label in results.labels if where else ():
+        if label != baseline and label not in results.facts.oracles:
+            both = ([results.values(row, name) for name in where] for row in (label, baseline))
+            differences = np.subtract(*both)
+            tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
+            clear = [sign * test.estimate.mean for test in tests if test.is_shown]
+            by_cluster = differences @ shares
+            over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
+            better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
+            rows.append(Margin(label, differences.mean(1), over_both, better, worse))
+    return sorted(rows, key=lambda row: -sign * row.over_both.mean)
+
+
+def verdicts(results: Results) -> Iterator[str]:
+    """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
+    judges their models; where no score could be had."""
+    rows, where, score = margins(results), shown_on(results), results.headline
+    if not rows:
+        yield "No display has a score of every method for every target."
+        return
+    about = [row for label in subjects(results) for row in rows if row.label == label]
+    for row in about:
+        margin, text = published(results, row.label, results.conditions[0]), _beats(results, row, len(where))
+        if margin is not None:
+            above = int((row.values >= margin).sum())
+            has = f"{above or 'none'} {'has' if above < 2 else 'have'}"
+            text += f"; {has} the published {score.with_unit(margin, signed=True)}"
+        yield f"{text}."
+    yield from _best(results)
+    if others := [row for row in rows if row not in about][:MOST]:
+        yield f"{'; '.join(_beats(results, row, len(where)) for row in others)}."
+    if parts := [f"{name} in {right} of {pairs}" for name, (right, pairs) in judged(results).items()]:
+        yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
+    known = parameters(results)
+    for row in about or rows[:1]:
+        if decides := cause(row.values, known):
+            share = f"R2 {max(decides.explained, 0.0):.2f} of displays left out"
+            clear = f"{decides.parameter} (rank correlation {decides.rho:+.2f}, {share})"
+            of = f"the margin of {row.label}"
+            yield (
+                f"What decides {of}: {clear}."
+                if decides.is_clear
+                else f"No parameter of the displays predicts {of} (the best is {decides.parameter}, {share})."
+            )
+    if left := [name for name in results.conditions if name not in where]:
+        yield f"Left out, since scores are missing: {words(left)}."
+
+
+def _beats(results: Results, row: Margin, count: int) -> str:
+    score, (low, high) = results.headline, row.spread
+    worse = f" and loses on {row.worse}" if row.worse else ""
+    return (
+        f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: "
+        f"median {score.with_unit(row.median, signed=True)}, {score.number(low, signed=True)} to "
+        f"{score.number(high, signed=True)} on nine in ten"
+    )
+
+
+def gains(results: Results) -> pd.DataFrame:
+    """By how much each method is better than the baseline, which is the first; a row for each of ``shown_on``."""
+    rows = {row.label: results.headline.sign * row.values for row in margins(results)}
+    return pd.DataFrame({str(results.baseline): 0.0, **rows}, index=shown_on(results))
+
+
+def _best(results: Results) -> Iterator[str]:
+    """The method that is best on most displays, and whether an error budget of a display tells where another is."""
+    gained, known, score = gains(results), display_map(results), results.headline
+    count, best = len(gained), gained.idxmax(axis=1).value_counts().reindex(gained.columns, fill_value=0)
+    usual = str(best.idxmax())
+    if known:
+        named = f"names the best method on {known.hits} of {count} displays left out"
+        cost, behind = known.behind(gained[usual]), known.behind(known.chosen)
+        always, asked = score.with_unit(cost), score.with_unit(behind)
+        if behind < cost:
+            budget = f"it {named} and costs {asked} on average ({usual} always: {always})"
+            yield f"To choose, measure an error budget: {budget}."
+        else:
+            nothing = f"always taking {usual} costs {always} on average"
+            yield f"To choose, measure nothing: {nothing}. An error budget {named} and costs {asked}."
+    yield f"{usual} is best on {best[usual]} of {count}."
+    labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
+    if known and labels:
+        shares = words([f"{max(known.explained(label), 0):.2f} of {label}" for label in labels])
+        yield f"Its parts ({'; '.join(known.shares)}) predict margins on displays left out: R2 {shares}."
+
+
+@dataclass(frozen=True)
+class Map:
+    """Displays by two shares of the squared error of captures, and the margins of methods on them; a row a display.
+
+    shares: columns named after what explains them; margins, predicted: a column a method, the baseline among them; the
+    latter by the lines that were fitted to all displays but the one.
+    """
+
+    shares: pd.DataFrame
+    margins: pd.DataFrame
+    predicted: pd.DataFrame
+
+    @property
+    def hits(self) -> int:
+        """Displays whose best method the shares name."""
+        return int((self.predicted.idxmax(axis=1) == self.margins.idxmax(axis=1)).sum())
+
+    @property
+    def chosen(self) -> pd.Series:
+        """The margins of the methods that the shares name."""
+        return pd.Series({name: self.margins.at[name, label] for name, label in self.predicted.idxmax(axis=1).items()})
+
+    def behind(self, margins: pd.Series) -> float:
+        """How far some margins stay behind the best ones, over displays."""
+        return float((self.margins.max(axis=1) - margins).mean())
+
+    def explained(self, label: str) -> float:
+        """The share of the variance of a method's margin over displays that the lines predict (R2, leaving one out); 0
+        where it does not vary."""
+        values, count = self.margins[label], len(self.margins)
+        others = (values.mean() - values) * count / (count - 1)  # from the mean of all displays but the one
+        missed, all_others = np.square(values - self.predicted[label]).sum(), np.square(others).sum()
+        return float(1 - missed / all_others) if all_others else 0.0
+
+
+def display_map(results: Results) -> Map | None:
+    """The map from the first error budget among the related studies that has all displays; None without one."""
+    gained = gains(results)
+    for other in results.related.values():
+        known = {budget.condition: budget.explained for budget in budgets(other)}
+        if len(gained) and known.keys() >= {*gained.index}:
+            *image, field = known[gained.index[0]]  # in the order of the config, the last one knows most
+            shares = [[part.share.mean for part in known[name]] for name in gained.index]
+            axes = [f"{image[-1].label} and what knows less", f"{field.label} alone"]
+            known_by = pd.DataFrame([[sum(row[:-1]), row[-1]] for row in shares], gained.index, axes)
+            return Map(known_by, gained, gained - missed(known_by, gained))
+    return None
+
+
+def missed(shares: pd.DataFrame, values: pd.DataFrame) -> pd.DataFrame:
+    """What lines in some shares miss of each display when they are fitted to all others.
+
+    Of a least-squares fit with hat matrix H, the residual of a point left out is r / (1 - h) (Allen, Technometrics 16,
+    125, 1974).
+    """
+    design = np.column_stack([np.ones(len(shares)), shares])
+    hat = design @ np.linalg.pinv(design)
+    return (values - hat @ values.to_numpy()).div(1 - np.diag(hat), axis=0)
+
+
+def parameters(results: Results) -> dict[str, Array]:
+    """What differs between the displays of a family, ``(displays,)`` by words; empty where they are of none."""
+    profiles = [results.facts.profiles[name] for name in shown_on(results) if name in results.facts.profiles]
+    family = next((name for name in names() if all(each.name.startswith(f"{name}-") for each in profiles)), None)
+    if family is None or len(profiles) < FEWEST_DISPLAYS:
+        return {}
+    loaded = load_family(family)
+    values = {
+        given.words: np.array([np.mean(value_of(profile, given.name)) for profile in profiles])
+        for given in (*loaded.parameters, *loaded.outside.parameters)
+    }
+    return {name: column for name, column in values.items() if np.ptp(column) > 0}
+
+
+def judged(results: Results) -> dict[str, tuple[int, int]]:
+    """How often control and prediction of models name the better of two methods that optimise through them.
+
+    From the related study that measured both: right ones and pairs over displays, by the title of the score.
+    """
+    gained, pairs = gains(results), dict[str, tuple[int, int]]()
+    models = (each for each in results.related.values() if each.study.measure == "prediction" and each.control)
+    for other in itertools.islice(models, 1):
+        for score in (*other.control, other.headline):
+            agree = []
+            for name, gain in gained.iterrows():
+                means = {
+                    label: other.values(label, name, score.key).mean()
+                    for label in other.methods(name)
+                    if label in gained.columns[1:] and other.is_complete(label, name, score.key)
+                }
+                for first, second in itertools.combinations(means, 2):
+                    agree.append((gain[first] - gain[second]) * (means[first] - means[second]) > 0)
+            pairs[score.title] = sum(agree), len(agree)
+    return pairs
+
+
+def table(board: Board) -> Markdown | None:
+    """A row for every method."""
+    score, count = board.results.headline, len(shown_on(board.results))
+    return table_of(
+        [
+            {
+                "method": row.label,
+                f"over displays and pictures{score.brackets}": score.estimate(row.over_both, signed=True),
+                f"median{score.brackets}": score.number(row.median, signed=True),
+                "5 to 95 % of displays": " to ".join(score.number(end, signed=True) for end in row.spread),
+                f"better on [of {count}]": row.better,
+                "worse on": row.worse,
+            }
+            for row in margins(board.results)
+        ]
+    )
+
+
+def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+    """Margins, and margins against what an error budget found, of the best methods and those of the question."""
+    results, path = report.results, report.figures / "quality-displays.png"
+    known, baseline, looked = margins(results), results.baseline, looks(results.names)
+    rows = [paired.Row(row.label, row.values, row.over_both, looked[row.label]) for row in known]
+    figures = {row.label: published(results, row.label, results.conditions[0]) for row in known}
+    lines = {f"published for {label}": value for label, value in figures.items() if value is not None}
+    paired.draw_rows(results, path, f"{len(shown_on(results))} displays", rows, lines)
+    yield (
+        path,
+        f"Differences to {baseline} in {results.headline.axis}. Small dots: displays, at the same "
+        "height in every row; marks and bars: means and their 95 % intervals over displays and clusters of targets.",
+    )
+    if drawn := display_map(results):
+        wanted = list(dict.fromkeys([*subjects(results), *drawn.margins.columns[1:]]))[:MOST_DRAWN]
+        path, axis = report.figures / "quality-map.png", f"difference to {baseline} in {results.headline.axis}"
+        draw_map(path, 100 * drawn.shares, drawn.margins, axis, {label: looked[label] for label in wanted})
+        yield (
+            path,
+            f"Differences to {baseline}, a mark a display, against two parts of its error, as error "
+            "budgets of the displays found them. Lines: least squares, for the eye.",
+        )
+
+
+PARTS = (Part(4, applies=lambda report: applies(report.results) and bool(shown_on(report.results)), figures=_figures),)

@@ -1,0 +1,94 @@
+"""Prediction (paper Table 1): which network predicts the captures of a display best, and is any better than none?
+
+Where the study measures control, also which one answers a change of the hologram as the display does: that is what a
+method needs that optimises through a network.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...metrics.control import MOST
+from .. import markdown
+from ..board import Board
+from ..markdown import Markdown
+from ..phrases import value, verdict
+from ..results import Results
+from ..scores import Score
+from ..story import is_many, subjects
+from ..text import grouped, words
+from .comparison import table as board_table
+
+ORDER = 30
+QUESTION = "Which network predicts the captures of the display best?"
+LIMITS = ("Training: one short training of each network; the order after longer ones may be another.",)
+
+
+def applies(results: Results) -> bool:
+    """Whether predictions are scored."""
+    return results.study.measure == "prediction"
+
+
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display; over many displays, who leads on how many by prediction and by control, and its mean over them."""
+    count, scores = len(results.conditions), [results.headline, *results.control]
+    for score in scores if is_many(results) else ():
+        firsts = [ranking[0] for name in results.conditions if (ranking := results.ranking(name, score.key))]
+        for first, leads in Counter(firsts).most_common(1):
+            known = _means(results, first, score)
+            mean, where = score.with_unit(float(np.mean(known))), f"{leads} of {count} displays"
+            yield f"By {score.title} {first} leads on {where}; its mean over {len(known)} is {mean}."
+    for condition in () if is_many(results) else results.conditions:
+        if ranking := results.ranking(condition):
+            parts = [f"{ranking[0]} predicts best ({value(results, ranking[0], condition)})"]
+            parts += [*_controls(results, condition), *_named(results, condition), *_reported(results, condition)]
+            yield f"{f'{condition}: ' * (count > 1)}{'; '.join(parts)}."
+
+
+def _controls(results: Results, condition: str) -> Iterator[str]:
+    """Who leads by control."""
+    for score in results.control:
+        for first in results.ranking(condition, score.key)[:1]:
+            own, most = (results.values(first, condition, key).mean() for key in (score.key, MOST))
+            yield f"{first} answers changes best (control {score.number(own)} of {score.number(most)})"
+
+
+def _named(results: Results, condition: str) -> Iterator[str]:
+    """Which networks of the question beat the baseline."""
+    tests = [test for label in subjects(results) if (test := results.tested(label, condition))]
+    groups = grouped((verdict(results.headline, test), test.second) for test in tests)
+    if parts := [f"{name}: {words(labels)}" for name, labels in groups.items()]:
+        yield f"than {results.baseline}, {', '.join(parts)}"
+
+
+def _reported(results: Results, condition: str) -> Iterator[str]:
+    """The place of the row that was published as the first."""
+    published = {label: row["psnr"] for label, row in (results.study.reported.rows if results.study.reported else {}).items() if "psnr" in row}
+    ranked = [label for label in results.ranking(condition) if label in published]
+    if len(ranked) > 1 and condition == (results.facts.beside or condition):
+        first = max(ranked, key=published.__getitem__)
+        yield f"{first}, published as first of {len(ranked)}, is number {ranked.index(first) + 1}"
+
+
+def table(board: Board) -> Markdown | None:
+    """The board; over many displays a row a method, every score's mean over them and its range."""
+    results = board.results
+    if not is_many(results):
+        return board_table(board)
+    headers, lines = ["method"], {label: [label] for label in results.labels}
+    for score in [results.headline, *results.control]:
+        headers += [score.heading, "least to most of displays"]
+        for label, cells in lines.items():
+            known = _means(results, label, score)
+            mean, least, most = map(score.number, (np.mean(known), min(known), max(known))) if known else ("–", "", "")
+            cells += [mean, f"{least} to {most}" if known else "–"]
+    return markdown.table(headers, list(lines.values()))
+
+
+def _means(results: Results, label: str, score: Score) -> list[float]:
+    """Of a method's score, on the displays on which it is complete."""
+    means = [float(results.values(label, name, score.key).mean()) for name in results.conditions]
+    return [mean for mean in means if np.isfinite(mean)]

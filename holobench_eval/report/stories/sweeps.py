@@ -1,0 +1,294 @@
+"""Sweeps: what does a change of the display cost each method, and where does a lead over the baseline end?"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ...display.simulated.changes import KINDS
+from ..board import Board, is_gray
+from ..charts.curves import draw_sweep
+from ..charts.style import slugs
+from ..charts.tiles import draw_rows, spread
+from ..facts import OFFLINE, ONLINE, Swept
+from ..markdown import Markdown, table_of
+from ..phrases import difference
+from ..results import Results
+from ..statistics import Estimate, ratio_interval
+from ..story import Part, Report, subjects
+from ..text import grouped, percent, words
+
+ORDER = 60
+QUESTION = "What does a change of the display cost each method?"
+SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
+LIMITS = (
+    "Changes: methods are prepared before a change, and only those with a camera at the scored picture solve after it. "
+    "Models and rates of the changes are assumed. The worst of several values is chosen by its mean, so that its "
+    "interval is a little optimistic. A claim holds if the interval of the largest loss ends at or below "
+    f"{SMALL:g} dB, and does not if it begins above.",
+)
+
+REMEDIES = ("corrected_eye", "known_eye")  # kinds that are meant to undo changes of the kind eye
+MOST_VALUES = 7  # pictures in a row; of more values, the nominal one and evenly spaced others are drawn
+MOST_ROWS = 4
+
+
+class Point(NamedTuple):
+    """A method on a display under one value of a kind of change, or before it.
+
+    text: the value with its unit; condition: under which cells stand for it; loss: what the change cost, target by
+    target, positive where the score got worse, None before the change; lead: over the baseline under the same change,
+    positive where it is better, None of the baseline. Both are None where a target has no score.
+    """
+
+    display: str
+    kind: str
+    method: str
+    value: float | str
+    text: str
+    condition: str
+    loss: Estimate | None
+    lead: Estimate | None
+
+    @property
+    def change(self) -> str:
+        """What changes, in words."""
+        return KINDS[self.kind].words
+
+
+def sweeps(results: Results) -> dict[tuple[str, str, str], list[Point]]:
+    """The points of every display, kind of change and method that is planned at every value of it."""
+
+    def better(first: tuple[str, str], second: tuple[str, str]) -> Estimate | None:
+        by = results.headline.sign * (results.values(*first) - results.values(*second))
+        return None if np.isnan(by).any() else results.estimate(by)
+
+    def point(swept: Swept, label: str, value: float | str, name: str) -> Point:
+        text = f"{f'{value:g}' if isinstance(value, float) else value} {KINDS[swept.kind].unit}".strip()
+        loss = better((label, swept.before), (label, name)) if name != swept.before else None
+        lead = better((label, name), (baseline, name)) if baseline not in (None, label) else None
+        return Point(swept.before, swept.kind, label, value, text, name, loss, lead)
+
+    baseline = results.baseline
+    return {
+        (swept.before, swept.kind, label): [point(swept, label, *place) for place in _places(swept)]
+        for swept in results.facts.sweeps
+        for label in _methods(results, swept)
+    }
+
+
+def _places(swept: Swept) -> list[tuple[float | str, str]]:
+    """(value, condition), by value, the unchanged display at its place; it leads as ``before`` where the values are no
+    numbers."""
+    nominal = KINDS[swept.kind].nominal
+    if nominal is None:
+        return [("before", swept.before), *swept.points]
+    return sorted([(nominal, swept.before), *swept.points], key=lambda point: float(point[0]))
+
+
+def _methods(results: Results, swept: Swept) -> list[str]:
+    """Those that are planned at every value; of draws, which are other benches and are asked for rankings, none."""
+    first, *others = (results.methods(name) for _, name in _places(swept))
+    return [label for label in first if swept.kind != "draw" and all(label in planned for planned in others)]
+
+
+def applies(results: Results) -> bool:
+    """Whether a method is planned at every value of a change."""
+    return any(_methods(results, swept) for swept in results.facts.sweeps)
+
+
+def verdicts(results: Results) -> Iterator[str]:
+    """One a display, how far a lens moves the picture or what glasses get back, else one a method, what changes cost at
+    most; then the claims of the config."""
+    swept = sweeps(results)
+    displays = grouped((points[0].display, points) for points in swept.values())
+    for display, here in displays.items():
+        named = f"{display}: " * (len(displays) > 1)
+        parts = [*_seen(results, here)] or [*_ranges(results, here), *_recovered(results, here)]
+        costs = (cost for label in _followed(results, display) for cost in _costs(results, here, label))
+        yield from (f"{named}{text}." for text in (["; ".join(parts)] if parts else costs))
+    for sweep, label in itertools.product(results.facts.sweeps, subjects(results)[:1]):
+        if sweep.claim and (points := swept.get((sweep.before, sweep.kind, label))):
+            yield f'"{sweep.claim.says}" {_judged(results, points, sweep.claim.until)}.'
+
+
+def _followed(results: Results, before: str) -> list[str]:
+    """The methods of the question, and the best before the change, if there are any of those that solve before it.
+
+    Where that is the baseline alone, also the next.
+    """
+    ranked = [results.ranking(before, categories=categories) for categories in (OFFLINE, (ONLINE,))]
+    best, baseline = (ranked[0] or ranked[1])[:1], results.baseline
+    followed = list(dict.fromkeys([*subjects(results), *best]))
+    others = [label for label in (*ranked[0], *ranked[1]) if label != baseline]
+    return [*followed, *others[:1]] if followed == [baseline] else followed
+
+
+def _lost(points: Iterable[Point]) -> list[tuple[Point, Estimate]]:
+    """The points whose loss is known, the largest loss first."""
+    return sorted(((point, point.loss) for point in points if point.loss), key=lambda each: -each[1].mean)
+
+
+def _costs(results: Results, here: list[list[Point]], label: str) -> Iterator[str]:
+    """The largest mean loss of a method, and whether its lead over the baseline lasts."""
+    score, baseline = results.headline, results.baseline
+    points = [point for points in here for point in points if point.method == label]
+    for worst, loss in _lost(points)[:1]:
+        cost = f"{label} loses at most {difference(score, loss)} ({worst.change}, {worst.text})"
+        lead = next(point.lead for point in points if point.condition == point.display)
+        if lead is None:
+            yield cost
+        elif lead.mean <= 0:
+            yield f"{cost}, with no lead over {baseline} before ({score.with_unit(lead.mean, signed=True)})"
+        else:
+            least = min(point.lead.mean for point in points if point.lead)
+            ends = "stays" if least > 0 else "is lost"
+            yield f"{cost}; its lead over {baseline} {ends}, {score.with_unit(least, signed=True)} at least"
+
+
+def _seen(results: Results, here: list[list[Point]]) -> Iterator[str]:
+    """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
+    score, baseline, parts = results.headline, str(results.baseline), []
+    pupils = [point for points in here for point in points if point.kind == "eye_pupil"]
+    leads = ((point.value, (point, point.lead)) for point in pupils if point.lead and point.condition != point.display)
+    for place, rivals in grouped(leads).items():
+        ranked = sorted(rivals, key=lambda rival: -rival[1].mean)
+        above = [rival for rival in ranked if rival[1].low > 0]
+        each = [f"{point.method} {difference(score, lead)}" for point, lead in (above or ranked)[:1]]
+        each += [f"{point.method} {score.with_unit(lead.mean, signed=True)}" for point, lead in above[1:]]
+        gray = f" ({baseline} is no better than gray there)" * is_gray(results, baseline, ranked[0][0].condition)
+        parts.append(f"at {place}{gray} {'' if above else 'none, at best '}{', '.join(each)}")
+    if parts:
+        yield (
+            f"above {baseline} by intervals, for an eye whose pupil is aside, in radii of the iris: {'; '.join(parts)}"
+        )
+
+
+def _ranges(results: Results, here: list[list[Point]]) -> Iterator[str]:
+    """How far a lens moves the picture for a small loss."""
+    lenses = [points for points in here if points[0].kind == "refocus"]
+    ranges = grouped((reach, points[0].method) for points in lenses if (reach := small_range(points)))
+    if ranges:
+        each = [f"{reach} ({words(labels)})" for reach, labels in ranges.items()]
+        yield f"a lens moves the picture for at most {SMALL:g} {results.headline.unit}: {', '.join(each)}"
+
+
+def small_range(points: list[Point]) -> str | None:
+    """The numbers around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:
+    ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``. None where the next one has no score."""
+    start, ends = [point.condition for point in points].index(points[0].display), list[float]()
+    for unchanged, *others in (points[start::-1], points[start:]):
+        end = unchanged.value
+        for point in others:
+            if point.loss is None:
+                return None
+            if abs(point.loss.mean) > SMALL:
+                break
+            end = point.value
+        ends.append(float(end))
+    low, high = ends
+    tested = [float(point.value) for point in points if point.condition != point.display]
+    less, more = " or less" * (low == min(tested)), " or more" * (high == max(tested))
+    span = f"{low:g}{less} to {high:g}{more} {KINDS[points[0].kind].unit}".strip()
+    return span if low < high else "nowhere"
+
+
+def _recovered(results: Results, here: list[list[Point]]) -> Iterator[str]:
+    """What share of a loss of the baseline each remedy gets back, from the worst to the best value."""
+    known = {points[0].kind: points for points in here if points[0].method == results.baseline}
+    for kind in REMEDIES:
+        if kind in known and "eye" in known:
+            shares = sorted(recovered(results, known["eye"], known[kind]), key=lambda share: share.mean)
+            ends = dict.fromkeys(f"{percent(share)} %" for share in shares[:1] + shares[-1:])
+            nothing = f"nothing, as no eye loses more than {SMALL:g} dB"
+            yield f"{KINDS[kind].words} gives back {' to '.join(ends) or nothing}"
+
+
+def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[Estimate]:
+    """Share of each loss that is got back under the same value of another kind; of a loss that is small, or not clear,
+    no share is told."""
+    by_value = {cure.value: cure.condition for cure in cures if cure.loss}
+    shares = []
+    for eye, loss in _lost(eyes):
+        if eye.value in by_value and loss.mean > SMALL and not loss.low <= 0:
+            names = (eye.display, eye.condition, by_value[eye.value])
+            before, blurred, cured = (results.values(eye.method, name) for name in names)
+            shares.append(ratio_interval(cured - blurred, before - blurred, results.clusters))
+    return shares
+
+
+def _judged(results: Results, points: list[Point], until: float | None) -> str:
+    """Whether a published claim of robustness holds: no mean loss above a decibel."""
+    score, far = results.headline, math.inf if until is None else until
+    within = [point for point in points if not (isinstance(point.value, float) and abs(point.value) > far)]
+    within = [point for point in within if point.condition != point.display]
+    if not (lost := _lost(within)) or len(lost) < len(within) or score.unit != "dB":
+        return f"cannot be judged for {points[0].method}: some points have no score"
+    worst, loss = lost[0]
+    holds = "holds" if loss.high <= SMALL else "does not hold" if loss.low > SMALL else "is not shown to hold or fail"
+    where = f"{worst.change}, {worst.text}"
+    return f"{holds} for {worst.method}: it loses at most {difference(score, loss)} ({where})"
+
+
+def table(board: Board) -> Markdown | None:
+    """A row a change and method: the worst value, the loss there, and what is left above the baseline."""
+    results, rows = board.results, []
+    score, baseline = results.headline, results.baseline
+    for points in sweeps(results).values():
+        for worst, loss in _lost(points)[:1]:
+            online = ", solves after the change" * (results.category(worst.method) == ONLINE)
+            row = {"change": worst.change, "display": worst.display}
+            row |= {"method": f"{results.facts.marked(worst.method)}{online}", "worst at": worst.text}
+            row |= {f"mean loss there{score.brackets}": score.estimate(loss, signed=True)}
+            if baseline:
+                row |= {f"above {baseline} there{score.brackets}": score.estimate(worst.lead, signed=True)}
+            rows.append(row)
+    return table_of(rows)
+
+
+def _curves(report: Report) -> Iterator[tuple[Path, str]]:
+    """Curves of every kind of change."""
+    results = report.results
+    kinds = grouped((points[0].kind, point) for points in sweeps(results).values() for point in points)
+    for kind, points in kinds.items():
+        path = report.figures / f"quality-sweep-{kind}.png"
+        draw_sweep(path, results, pd.DataFrame(points), f"{results.headline.axis}{report.results.text.axis}")
+        yield (
+            path,
+            f"{results.headline.axis} along a change: {points[0].change}. Mean over targets; bars, slightly offset: "
+            "95 % interval of the paired mean difference to the unchanged display. Dashed: the baseline.",
+        )
+
+
+def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
+    """Rows of pictures of the target in the middle of their ranking by quality, a row a chosen method."""
+    results, thumbnails, stems = report.results, report.thumbnails, slugs(report.results.conditions)
+    if not thumbnails.targets(results.conditions[0]):
+        return
+    target, swept = thumbnails.middle(results.conditions[0]), sweeps(results)
+    for display, kind in dict.fromkeys((display, kind) for display, kind, _ in swept):
+        ranked = results.ranking(display, categories=(*OFFLINE, ONLINE))
+        rows = [
+            (str(label), [(point.text, thumbnails.tile(str(label), point.condition, target)) for point in points])
+            for label in dict.fromkeys([results.baseline, *subjects(results), *ranked])
+            if (points := spread(swept.get((display, kind, str(label)), []), MOST_VALUES))
+        ]
+        change, path = KINDS[kind].words, report.figures / f"sweep-{kind}-{stems[display]}.jpg"
+        draw_rows(path, f"{display}: {change}", (target, thumbnails.targets(display)[target]), rows[:MOST_ROWS])
+        yield path, f"Captures of {target} on {display} along a change: {change}."
+
+
+def _applies(report: Report) -> bool:
+    return applies(report.results)
+
+
+PARTS = (
+    Part(45, applies=_applies, figures=_curves),
+    Part(46, applies=_applies, figures=lambda report: report.pictures("sweep-*.jpg", _pictures)),
+)
