@@ -27,8 +27,8 @@ from ..charts.error_budget import draw_budgets
 from ..markdown import Markdown, table_of
 from ..results import Results
 from ..statistics import Array, Estimate
-from ..story import Part, Report, is_many
-from ..text import bracketed, percent, words
+from ..story import Report, is_many
+from ..text import bracketed, percent
 
 ORDER = 10
 QUESTION = "Where does the error of the captures come from, and who can remove it?"
@@ -114,17 +114,25 @@ def verdicts(results: Results) -> Iterator[str]:
     known = budgets(results)
     if not known:
         yield "No display has the scores of all methods for all targets, so none has a budget."
-    elif is_many(results):
-        over = _over(known).items()
-        shares = [f"{label} {part.mean():.0f} % ({part.min():.0f} to {part.max():.0f})" for label, part in over]
-        yield f"Over {len(known)} displays, the squared error is explained by {words(shares)}."
-    else:
-        for budget in known:
-            shares = [f"{part.label} {100 * part.share.mean:z.0f} %" for part in budget.parts]
-            # of the last two links of the chain: of the image, and of the field
-            gains = [f"{part.gain.mean:+.1f} dB with {part.label}" for part in budget.explained[-2:] if part.gain]
-            begin = f"{budget.condition}: " * (len(known) > 1)
-            yield f"{begin}the error is explained by {', '.join(shares)}; at most {words(gains)}."
+    for found in [known] if is_many(results) and known else [[budget] for budget in known]:
+        shares = {
+            part.label: 100 * np.array([b.parts[i].share.mean for b in found]) for i, part in enumerate(found[0].parts)
+        }
+        *before, last, _, _ = shares
+        part, rest = _share(shares[last]), [f"{label} {_share(shares[label])}" for label in [*shares][-2:]]
+        image = _share(np.sum([shares[label] for label in before], axis=0))
+        gains = [b.explained[-1].gain.mean for b in found if b.explained[-1].gain]
+        begin = f"{found[0].condition}: " if 1 < len(known) != len(found) else ""
+        yield (
+            f"{begin}Only {last} explains {part} of the error, what is known of the image {image}; "
+            f"without both, captures gain {max(gains):.1f} dB at most. By nothing: {' and '.join(rest)}."
+        )
+
+
+def _share(percents: Array) -> str:
+    """The mean over displays, and the least and the most of them where there are several."""
+    ends = f" ({percents.min():.0f} to {percents.max():.0f})" * (len(percents) > 1)
+    return f"{percents.mean():z.0f} %{ends}"
 
 
 def _over(known: list[Budget]) -> dict[str, Array]:
@@ -165,7 +173,7 @@ def table(board: Board) -> Markdown | None:
     return table_of(lines)
 
 
-def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Where the error of captures comes from."""
     if known := budgets(report.results):
         path = report.figures / "error-budget.png"
@@ -176,6 +184,3 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
             "what removing a part and all parts to its left would gain at most, with its 95 % interval over clusters; "
             "for temporal noise, what captures with no other error would gain.",
         )
-
-
-PARTS = (Part(5, figures=_figures),)

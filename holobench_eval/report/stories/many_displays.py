@@ -22,9 +22,10 @@ from ..charts import paired
 from ..charts.family import draw_map
 from ..charts.look.methods import looks
 from ..markdown import Markdown, table_of
+from ..phrases import effect
 from ..results import Results
 from ..statistics import FEWEST_DISPLAYS, Array, Estimate, cause, two_way
-from ..story import Part, Report, is_many, subjects
+from ..story import Report, is_many, subjects
 from ..text import words
 from .comparison import published
 from .error_budget import budgets
@@ -84,10 +85,10 @@ def margins(results: Results) -> list[Margin]:
             both = ([results.values(row, name) for name in where] for row in (label, baseline))
             differences = np.subtract(*both)
             tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
-            clear = [sign * test.estimate.mean for test in tests if test.is_shown]
+            effects = [effect(results.headline, test) for test in tests]
             by_cluster = differences @ shares
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
-            better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
+            better, worse = effects.count("better"), effects.count("worse")
             rows.append(Margin(label, differences.mean(1), over_both, better, worse))
     return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 
@@ -95,46 +96,41 @@ def margins(results: Results) -> list[Margin]:
 def verdicts(results: Results) -> Iterator[str]:
     """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
     judges their models; where no score could be had."""
-    rows, where, score = margins(results), shown_on(results), results.headline
+    rows, where = margins(results), shown_on(results)
     if not rows:
         yield "No display has a score of every method for every target."
         return
-    about = [row for label in subjects(results) for row in rows if row.label == label]
-    for row in about:
-        margin, text = published(results, row.label, results.conditions[0]), _beats(results, row, len(where))
-        if margin is not None:
-            above = int((row.values >= margin).sum())
-            has = f"{above or 'none'} {'has' if above < 2 else 'have'}"
-            text += f"; {has} the published {score.with_unit(margin, signed=True)}"
-        yield f"{text}."
-    yield from _best(results)
-    if others := [row for row in rows if row not in about][:MOST]:
-        yield f"{'; '.join(_beats(results, row, len(where)) for row in others)}."
-    if parts := [f"{name} in {right} of {pairs}" for name, (right, pairs) in judged(results).items()]:
-        yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
+    about, count = [row for label in subjects(results) for row in rows if row.label == label], len(where)
+    yield from (_beats(results, row, count) for row in about)
+    if len(rows) > 1:
+        yield from _best(results)
+        yield from (_beats(results, row, count) for row in [row for row in rows if row not in about][:MOST])
+    if parts := [f"{right} of {pairs} by {name}" for name, (right, pairs) in judged(results).items()]:
+        yield f"Of two methods on a display, that with the better model is better: {words(parts)} pairs."
     known = parameters(results)
     for row in about or rows[:1]:
-        if decides := cause(row.values, known):
-            share = f"R2 {max(decides.explained, 0.0):.2f} of displays left out"
-            clear = f"{decides.parameter} (rank correlation {decides.rho:+.2f}, {share})"
-            of = f"the margin of {row.label}"
-            yield (
-                f"What decides {of}: {clear}."
-                if decides.is_clear
-                else f"No parameter of the displays predicts {of} (the best is {decides.parameter}, {share})."
-            )
+        if (decides := cause(row.values, known)) and decides.is_clear:
+            share = f"rank correlation {decides.rho:+.2f}, R2 {decides.explained:.2f} on displays left out"
+            yield f"{decides.parameter.capitalize()} decides the margin of {row.label}: {share}."
+        elif decides:
+            yield f"No parameter of the displays predicts the margin of {row.label}."
     if left := [name for name in results.conditions if name not in where]:
         yield f"Left out, since scores are missing: {words(left)}."
 
 
 def _beats(results: Results, row: Margin, count: int) -> str:
     score, (low, high) = results.headline, row.spread
-    worse = f" and loses on {row.worse}" if row.worse else ""
-    return (
-        f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: "
-        f"median {score.with_unit(row.median, signed=True)}, {score.number(low, signed=True)} to "
-        f"{score.number(high, signed=True)} on nine in ten"
+    worse, ends = (
+        f" and loses on {row.worse}" * bool(row.worse),
+        f"{score.number(low, True)} to {score.number(high, True)}",
     )
+    text = f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: median "
+    text += f"{score.with_unit(row.median, signed=True)}, nine in ten {ends}."
+    margin = published(results, row.label, results.conditions[0])
+    if margin is None:
+        return text
+    above = int((row.values >= margin).sum())
+    return f"{text} The published {score.with_unit(margin, signed=True)}: on {above or 'none'}."
 
 
 def gains(results: Results) -> pd.DataFrame:
@@ -148,21 +144,16 @@ def _best(results: Results) -> Iterator[str]:
     gained, known, score = gains(results), display_map(results), results.headline
     count, best = len(gained), gained.idxmax(axis=1).value_counts().reindex(gained.columns, fill_value=0)
     usual = str(best.idxmax())
+    yield f"Best on most displays: {usual}, on {best[usual]} of {count}."
     if known:
-        named = f"names the best method on {known.hits} of {count} displays left out"
-        cost, behind = known.behind(gained[usual]), known.behind(known.chosen)
-        always, asked = score.with_unit(cost), score.with_unit(behind)
-        if behind < cost:
-            budget = f"it {named} and costs {asked} on average ({usual} always: {always})"
-            yield f"To choose, measure an error budget: {budget}."
-        else:
-            nothing = f"always taking {usual} costs {always} on average"
-            yield f"To choose, measure nothing: {nothing}. An error budget {named} and costs {asked}."
-    yield f"{usual} is best on {best[usual]} of {count}."
-    labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
-    if known and labels:
-        shares = words([f"{max(known.explained(label), 0):.2f} of {label}" for label in labels])
-        yield f"Its parts ({'; '.join(known.shares)}) predict margins on displays left out: R2 {shares}."
+        always, asked = (known.behind(margins) for margins in (gained[usual], known.chosen))
+        nothing, budget = f"always taking {usual} costs {score.with_unit(always)}", f"costs {score.with_unit(asked)}"
+        how = "an error budget" if asked < always else "nothing"
+        named = f"an error budget names the best method on {known.hits} of {count} displays left out and {budget}"
+        yield f"To choose, measure {how}: {nothing} in the mean; {named}."
+        labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
+        shares = words([f"{max(known.explained(label), 0):.2f} for {label}" for label in labels])
+        yield f"What parts of an error budget predict of a margin on displays left out: R2 {shares}."
 
 
 @dataclass(frozen=True)
@@ -279,9 +270,11 @@ def table(board: Board) -> Markdown | None:
     )
 
 
-def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Margins, and margins against what an error budget found, of the best methods and those of the question."""
     results, path = report.results, report.figures / "quality-displays.png"
+    if not (applies(results) and shown_on(results)):
+        return
     known, baseline, looked = margins(results), results.baseline, looks(results.names)
     rows = [paired.Row(row.label, row.values, row.over_both, looked[row.label]) for row in known]
     figures = {row.label: published(results, row.label, results.conditions[0]) for row in known}
@@ -301,6 +294,3 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
             f"Differences to {baseline}, a mark a display, against two parts of its error, as error "
             "budgets of the displays found them. Lines: least squares, for the eye.",
         )
-
-
-PARTS = (Part(4, applies=lambda report: applies(report.results) and bool(shown_on(report.results)), figures=_figures),)

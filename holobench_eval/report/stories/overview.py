@@ -13,16 +13,15 @@ import numpy as np
 
 from ...study.plan import is_reference
 from ..board import board
-from ..charts import paired
 from ..charts.tiles import draw_rows
 from ..facts import FLOOR
 from ..markdown import Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
 from ..phrases import edited, remarks, too_few, uncovered
 from ..results import DONE, Results
 from ..statistics import FEWEST, POWER, SIGNIFICANCE
-from ..story import Blocks, Figures, Part, Report, is_many, subjects
+from ..story import Blocks, Figures, Part, Report, subjects
 from ..text import FILES, grouped, plain, sample, words
-from . import answer, comparison, many_displays, story_of
+from . import answer, comparison, stories, story_of
 from .alignment import agreement
 from .training import trainings
 
@@ -50,11 +49,11 @@ def _table(report: Report, _: Figures) -> Blocks:
     return [getattr(story_of(report.results), "table", comparison.table)(board(report.results))]
 
 
-def _plots(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
-    """Differences to the baseline on some of the displays that have any."""
-    for condition, stem in paired.displays(report.results)[some]:
-        path = report.figures / f"quality-paired-{stem}.png"
-        yield path, paired.draw(report.results, condition, path)
+def _figures(report: Report) -> list[tuple[Path, str]]:
+    """The figures of numbers of all stories, that of the study's own first, which alone stands in report.md."""
+    own = story_of(report.results)
+    drawn = dict.fromkeys([own, comparison, *stories()] if hasattr(own, "figures") else [comparison, *stories()])
+    return [figure for story in drawn if hasattr(story, "figures") for figure in story.figures(report)]
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -408,18 +407,13 @@ def _has_scores(report: Report) -> bool:
     return _has_displays(report) and values is not None and bool(np.isfinite(values).any())
 
 
-def _has_plot(report: Report) -> bool:
-    own = report.results.study.measure == "error_budget" or any(part.applies(report) for part in many_displays.PARTS)
-    return _has_scores(report) and not own
-
-
 ANSWER = Part(2, _answer, applies=_has_displays)
 LIMITATIONS = Part(75, _limits, applies=_has_displays)
 PARTS = (
     Part(0, _title),
     ANSWER,
     Part(3, _table, applies=_has_scores),
-    Part(4, applies=_has_plot, figures=lambda report: _plots(report, slice(1))),
+    Part(4, applies=_has_scores, figures=lambda report: report.once(_figures)[:1]),
     Part(6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
     LIMITATIONS,
     Part(210, _reproduce),
@@ -427,12 +421,7 @@ PARTS = (
     Part(5, _more_limits, applies=_has_displays, details=True),
     Part(10, _setup, details=True),
     Part(20, _described, applies=lambda report: report.results.study.measure != FILES, details=True),
-    Part(
-        30,
-        applies=lambda report: _has_scores(report) and not is_many(report.results),
-        figures=lambda report: _plots(report, slice(1, None)),
-        details=True,
-    ),
+    Part(30, applies=_has_scores, figures=lambda report: report.once(_figures)[1:], details=True),
     Part(90, figures=_stages, details=True),
     Part(120, _tests, details=True),
     Part(190, _holes, details=True),

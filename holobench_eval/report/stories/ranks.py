@@ -131,11 +131,11 @@ def verdicts(results: Results) -> Iterator[str]:
         yield "Methods with all scores tie before any draw or in each of them, so there is no ranking to compare."
     for each in existing:
         display, nominal = each.swept.before, each.ranks.loc[0]
-        leaders = list(nominal.index[nominal == 1])
+        leader = nominal.index[nominal == 1][0]
         yield (
-            f"{f'{display}: ' * (len(existing) > 1)}{words(leaders)}, first on {display}, is first on "
-            f"{percent(each.first(leaders[0]))} % of its draws; Kendall's tau with its ranking is "
-            f"{bracketed(each.tau, '.2f')}{_turning(each)}."
+            f"{f'{display}: ' * (len(existing) > 1)}{leader}, best on {display}, is best on "
+            f"{percent(each.first(leader))} % of {len(each.quality) - 1} draws of it. Kendall's tau of rankings is "
+            f"{bracketed(each.tau, '.2f')}.{_turning(each)}"
         )
 
 
@@ -145,7 +145,7 @@ def _turning(each: Ranks) -> str:
     if not apart:
         return ""
     most = max(apart, key=lambda pair: pair.flips)
-    return f"; {most.second} passes {most.first} most often, on {percent(each.share(most.flips))} %"
+    return f" Most often {most.second} passes {most.first}, on {percent(each.share(most.flips))} %."
 
 
 def table(board: Board) -> Markdown | None:
@@ -250,11 +250,4 @@ def figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _drawn_from(report: Report) -> bool:
-    return applies(report.results)
-
-
-PARTS = (
-    Part(47, applies=_drawn_from, figures=figures),
-    Part(60, _render, applies=_drawn_from, details=True),
-)
+PARTS = (Part(60, _render, applies=lambda report: applies(report.results), details=True),)
