@@ -10,10 +10,7 @@ from ..text import grouped, words
 
 ORDER = 80
 QUESTION = "Which single change of the method matters?"
-LIMITS = (
-    "Training: each row was trained once, and the intervals do not hold what another training of the same row "
-    "would change; a row with another seed, where there is one, shows how much that is.",
-)
+LIMITS = ("Training: each row was trained once, and no interval holds what another training would change.",)
 FEWEST = 3  # variants of the baseline method that make a study an ablation
 NAMED = 2  # changes that the verdict lists with their differences
 

@@ -17,9 +17,8 @@ from ..text import grouped, number, words
 ORDER = 90
 QUESTION = "How many captures does a method need, and what do more captures buy?"
 LIMITS = (
-    "Captures: those of a training are counted once and those of solving for every target, so with more targets "
-    "the methods that use the camera for each image cost more and the others do not. Differences between budgets "
-    "of a method are untested.",
+    "Captures: those of a training count once, those of solving for every target. Differences between budgets of a "
+    "method are untested.",
 )
 
 

@@ -27,6 +27,7 @@ LISTED = 10  # methods, or targets of all of them
 LISTED_EACH = 3  # targets of a method
 MOST_ROWS = 30  # of boards, one below the other
 ASKS = re.compile(r"^(Does|Do|Is|Are)\b.*\b(better|gains?|beats?)\b")
+CONTROL = "Control: the share of what a change of the hologram does to its capture that a model foresees (0 to 1)."
 EFFECTS = {  # in words, of a method and of several
     "better": ("beats", "beat"),
     UNSHOWN: ("is not shown to differ from", "are not shown to differ from"),
@@ -96,11 +97,11 @@ def compared(results: Results, tests: list[PairedTest]) -> Iterator[str]:
         if len(same) == 1 and told in ("better", "worse"):
             by = difference(score, same[0].estimate)
         if few:  # no test can show anything, so that counts say what is there
-            by = "; ".join(
-                f"{score.with_unit(t.estimate.mean, signed=True)}, better on {t.better(score.sign)} of {t.estimate.n}"
-                for t in same
+            each = zip(same, ends, strict=True)
+            counts = (
+                f"{by} {score.unit}, better on {t.better(score.sign)} of {t.estimate.n} targets" for t, by in each
             )
-            yield f"{names} against {results.baseline}: {by}{beside}."
+            yield f"{names} against {results.baseline}: {'; '.join(counts)}{beside}."
         else:
             yield f"{names} {EFFECTS[told][len(same) > 1]} {results.baseline}, {by}{beside}."
 
@@ -187,6 +188,7 @@ def legend(board: Board) -> str:
         texts.append(f"°: {UNSHOWN} (p ≥ {SIGNIFICANCE:g}, adjusted for {count} comparisons).")
     texts += ["*: no better than gray."] * any("no better than gray" in row.marks for row in rows)
     texts += [f"A gray picture scores {'; '.join(gray)}."] * bool(gray)
+    texts += [CONTROL] * bool(results.control)
     return " ".join([*texts, "Brackets: 95 % intervals."])
 
 

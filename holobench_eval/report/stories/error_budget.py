@@ -24,17 +24,17 @@ import numpy as np
 from ...metrics import error_budget as scores
 from ..board import Board
 from ..charts.error_budget import draw_budgets
-from ..markdown import Markdown, table_of
+from ..markdown import Markdown, blocks, table_of
 from ..results import Results
 from ..statistics import Array, Estimate
 from ..story import Report, is_many
 from ..text import bracketed, percent
+from .comparison import CONTROL
 
 ORDER = 10
 QUESTION = "Where does the error of the captures come from, and who can remove it?"
 LIMITS = (
-    "Bounds: a part is what one prediction explains and none before it did, if it is known which prediction to "
-    "believe; a hologram gains less from it than its dB, and a larger model or more captures may explain more.",
+    "Bounds: a part is what a prediction explains and none before it does; a hologram gains less from it than its dB.",
     "Parts: image-domain terms are a tone curve, shading, blur and haze, fitted on training captures.",
 )
 
@@ -170,7 +170,7 @@ def table(board: Board) -> Markdown | None:
             }
             control = {score.heading: "–" if model is None else score.in_row(model) for score in results.control}
             lines.append(line | control)
-    return table_of(lines)
+    return blocks([table_of(lines), CONTROL if results.control else None]) if lines else None
 
 
 def figures(report: Report) -> Iterator[tuple[Path, str]]:

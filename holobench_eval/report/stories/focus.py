@@ -16,10 +16,7 @@ from .comparison import compared
 
 ORDER = 40
 QUESTION = "What does a hologram of all planes or views of a scene gain over that of one, and what does it cost?"
-LIMITS = (
-    "Scenes: the planes or views of a scene are not independent, so intervals and tests are over scenes, which are "
-    "few.",
-)
+LIMITS = ("Scenes: planes or views of a scene are not independent, so intervals and tests are over scenes.",)
 
 # By measure: what a hologram is made of that knows of all and that knows of one; the title of the details; what their
 # columns are, and in which unit; and what must be known of these.

@@ -32,10 +32,7 @@ from .error_budget import budgets
 
 ORDER = 70
 QUESTION = "On how many of the displays is a method better than the baseline, and by how much over all of them?"
-LIMITS = (
-    "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
-    "Better and worse are shown by one family of tests over all methods and displays.",
-)
+LIMITS = ("Family: the displays are drawn from assumed ranges, and an interval over them speaks for such displays.",)
 MOST = 2  # methods that the answer names beside those of the question
 MOST_DRAWN = 5  # in the map
 
@@ -105,8 +102,8 @@ def verdicts(results: Results) -> Iterator[str]:
     if len(rows) > 1:
         yield from _best(results)
         yield from (_beats(results, row, count) for row in [row for row in rows if row not in about][:MOST])
-    if parts := [f"{right} of {pairs} by {name}" for name, (right, pairs) in judged(results).items()]:
-        yield f"Of two methods on a display, that with the better model is better: {words(parts)} pairs."
+    if parts := [f"in {right} of {pairs} pairs by {name}" for name, (right, pairs) in judged(results).items()]:
+        yield f"Of two methods on a display, that with the better model is better {words(parts)}."
     known = parameters(results)
     for row in about or rows[:1]:
         if (decides := cause(row.values, known)) and decides.is_clear:
@@ -130,7 +127,7 @@ def _beats(results: Results, row: Margin, count: int) -> str:
     if margin is None:
         return text
     above = int((row.values >= margin).sum())
-    return f"{text} The published {score.with_unit(margin, signed=True)}: on {above or 'none'}."
+    return f"{text} The published {score.with_unit(margin, signed=True)} is reached on {above or 'none'}."
 
 
 def gains(results: Results) -> pd.DataFrame:
@@ -153,7 +150,7 @@ def _best(results: Results) -> Iterator[str]:
         yield f"To choose, measure {how}: {nothing} in the mean; {named}."
         labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
         shares = words([f"{max(known.explained(label), 0):.2f} for {label}" for label in labels])
-        yield f"What parts of an error budget predict of a margin on displays left out: R2 {shares}."
+        yield f"An error budget predicts margins on displays left out with R2 {shares}."
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ def verdicts(results: Results) -> Iterator[str]:
             yield f"By {score.title}, {first} leads on {where}, with {mean} in the mean over {len(known)}."
     for condition in () if is_many(results) else results.conditions:
         if ranking := results.ranking(condition):
-            best = f"Best prediction: {ranking[0]}, {value(results, ranking[0], condition)}."
+            best = f"Best: {ranking[0]}, {value(results, ranking[0], condition)}."
             sentences = [*_reported(results, condition), *_named(results, condition), best]
             sentences += _controls(results, condition)
             yield f"{f'{condition}: ' * (count > 1)}{' '.join(sentences)}"
@@ -55,7 +55,13 @@ def _controls(results: Results, condition: str) -> Iterator[str]:
     for score in results.control:
         for first in results.ranking(condition, score.key)[:1]:
             own, most = (results.values(first, condition, key).mean() for key in (score.key, MOST))
-            yield f"Best answer to a changed hologram: {first}, control {score.number(own)} of {score.number(most)}."
+            best = results.ranking(condition)[0]
+            who = (
+                "It also answers a changed hologram best"
+                if first == best
+                else f"To a changed hologram, {first} answers best"
+            )
+            yield f"{who}: control {score.number(own)} of {score.number(most)}."
 
 
 def _named(results: Results, condition: str) -> Iterator[str]:

@@ -29,10 +29,8 @@ ORDER = 60
 QUESTION = "What does a change of the display cost each method?"
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 LIMITS = (
-    "Changes: methods are prepared before a change, and only those with a camera at the scored picture solve after it. "
-    "Models and rates of the changes are assumed. The worst of several values is chosen by its mean, so that its "
-    "interval is a little optimistic. A claim holds if the interval of the largest loss ends at or below "
-    f"{SMALL:g} dB, and does not if it begins above.",
+    "Changes: methods are prepared before a change; models and rates of the changes are assumed. A claim holds if the "
+    f"interval of the largest loss ends at or below {SMALL:g} dB.",
 )
 
 REMEDIES = ("corrected_eye", "known_eye")  # kinds that are meant to undo changes of the kind eye
@@ -111,9 +109,9 @@ def verdicts(results: Results) -> Iterator[str]:
     displays = grouped((points[0].display, points) for points in swept.values())
     for display, here in displays.items():
         named = f"{display}: " * (len(displays) > 1)
-        parts = [*_seen(results, here)] or [*_ranges(results, here), *_recovered(results, here)]
         costs = (cost for label in _followed(results, display) for cost in _costs(results, here, label))
-        yield from (f"{named}{text}" for text in ([" ".join(parts)] if parts else costs))
+        own = [*_seen(results, here), *_ranges(results, here), *_recovered(results, here)]
+        yield from (f"{named}{text}" for text in own or costs)
     asked = itertools.product(results.facts.sweeps, subjects(results)[:1])
     claims = ((sweep.claim, swept.get((sweep.before, sweep.kind, label))) for sweep, label in asked if sweep.claim)
     known = ((claim.says, _judged(results, points, claim.until)) for claim, points in claims if points)
@@ -168,14 +166,14 @@ def _seen(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
     score, baseline = results.headline, str(results.baseline)
     pupils = [point for points in here for point in points if point.kind == "eye_pupil"]
-    leads = ((point.value, (point, point.lead)) for point in pupils if point.lead and point.condition != point.display)
+    aside = [point for point in pupils if point.condition != point.display and float(point.value)]
+    leads = ((point.value, (point, point.lead)) for point in aside if point.lead)
     for place, rivals in grouped(leads).items():
         ranked = sorted(rivals, key=lambda rival: -rival[1].mean)
         above, (best, lead) = sum(lead.low > 0 for _, lead in ranked), ranked[0]
-        gray = ", which is no better than gray" * is_gray(results, baseline, best.condition)
-        how = f"{best.method}, {difference(score, lead)}"
-        counts = f"{above or 'none'} of {len(ranked)} beat {baseline}{gray}"
-        yield f"Pupil {place} iris radii off axis: {counts}; best {how}."
+        gray = f", where {baseline} is no better than gray" * is_gray(results, baseline, best.condition)
+        counts = f"{above or 'none'} of {len(ranked)} beat {baseline}; best {best.method}, {difference(score, lead)}"
+        yield f"Pupil {place} iris radii off axis{gray}: {counts}."
 
 
 def _ranges(results: Results, here: list[list[Point]]) -> Iterator[str]:
@@ -209,13 +207,14 @@ def small_range(points: list[Point]) -> str | None:
 
 def _recovered(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """What share of a loss of the baseline each remedy gets back, from the worst to the best value."""
-    known = {points[0].kind: points for points in here if points[0].method == results.baseline}
+    known, parts = {points[0].kind: points for points in here if points[0].method == results.baseline}, []
     for kind in REMEDIES:
         if kind in known and "eye" in known:
             shares = sorted(recovered(results, known["eye"], known[kind]), key=lambda share: share.mean)
-            ends = dict.fromkeys(f"{percent(share)} %" for share in shares[:1] + shares[-1:])
-            back = f"gets {' to '.join(ends)} of the loss back" if ends else "has nothing to get back"
-            yield f"{KINDS[kind].words.capitalize()}, {back}."
+            ends = " to ".join(dict.fromkeys(map(percent, shares[:1] + shares[-1:])))
+            parts += [f"{ends} % with {KINDS[kind].words}"] if ends else [f"no eye loses more than {SMALL:g} dB"]
+    if parts:
+        yield f"Of the loss comes back: {'; '.join(dict.fromkeys(parts))}."
 
 
 def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[Estimate]:
@@ -255,7 +254,7 @@ def table(board: Board) -> Markdown | None:
         row = lines.setdefault((display, kind), line | dict.fromkeys(labels, "–"))
         for worst, loss in _lost(points)[:1]:
             row[label] = f"{score.number(loss.mean)} at {worst.text}"
-    note = f"Loss of the mean{score.brackets} at the worst value tried; {DETAILS} has the intervals."
+    note = f"Loss of the mean{score.brackets} at the worst value tried, below zero a gain; {DETAILS} has the intervals."
     return blocks([table_of([*lines.values()]), note]) if lines else None
 
 
