@@ -130,7 +130,7 @@ def basis(profile: Profile) -> str:
     except UserError:
         return measured
     free = words([name.replace(".", " ").replace("_", " ") for name in calibration.free])
-    return f"{measured}; {free} were fitted to published PSNR, so that agreement with it is no evidence"
+    return f"simulated, with {free} fitted to published PSNR, so that agreement with it is no evidence"
 
 
 def _gray(panel: Panel | DisplaySpec) -> str:
@@ -154,4 +154,4 @@ def _stages(profile: Profile) -> str:
         neutral = item.default_factory() if item.default_factory is not MISSING else item.default
         if is_dataclass(stage) and not isinstance(stage, type | Panel) and stage != neutral:
             names.append(item.name.replace("_", " "))
-    return f"stages with effects: {', '.join(names) or 'none'}; their values are in the profile"
+    return f"stages with effects: {', '.join(names) or 'none'}"

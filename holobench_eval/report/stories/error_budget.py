@@ -119,20 +119,16 @@ def verdicts(results: Results) -> Iterator[str]:
             part.label: 100 * np.array([b.parts[i].share.mean for b in found]) for i, part in enumerate(found[0].parts)
         }
         *before, last, _, _ = shares
-        part, rest = _share(shares[last]), [f"{label} {_share(shares[label])}" for label in [*shares][-2:]]
-        image = _share(np.sum([shares[label] for label in before], axis=0))
+        means = {label: f"{values.mean():z.0f} %" for label, values in shares.items()}
+        ends = f" ({shares[last].min():.0f} to {shares[last].max():.0f})" * (len(found) > 1)
+        image = sum(shares[label].mean() for label in before)
+        rest = [f"{label} {means[label]}" for label in [*shares][-2:]]
         gains = [b.explained[-1].gain.mean for b in found if b.explained[-1].gain]
         begin = f"{found[0].condition}: " if 1 < len(known) != len(found) else ""
         yield (
-            f"{begin}Only {last} explains {part} of the error, what is known of the image {image}; "
+            f"{begin}Only {last} explains {means[last]}{ends} of the error, what is known of the image {image:.0f} %; "
             f"without both, captures gain {max(gains):.1f} dB at most. By nothing: {' and '.join(rest)}."
         )
-
-
-def _share(percents: Array) -> str:
-    """The mean over displays, and the least and the most of them where there are several."""
-    ends = f" ({percents.min():.0f} to {percents.max():.0f})" * (len(percents) > 1)
-    return f"{percents.mean():z.0f} %{ends}"
 
 
 def _over(known: list[Budget]) -> dict[str, Array]:

@@ -20,7 +20,7 @@ from ..phrases import edited, remarks, uncovered
 from ..results import DONE, Results
 from ..statistics import FEWEST, POWER, SIGNIFICANCE
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
-from ..text import FILES, grouped, plain, sample, words
+from ..text import FILES, grouped, plain, words
 from . import answer, comparison, stories, story_of
 from .alignment import agreement
 from .training import trainings
@@ -88,29 +88,30 @@ def _stages(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
-    known = limits(report)
-    more = Markdown("[{} more](details.md#limits)").format(len(known) - FIRST)
-    return [heading("Limits"), bullets([*known[:FIRST], *[more] * (len(known) > FIRST)])]
+    first, more = limits(report)
+    link = Markdown("[{} more](details.md#limits)").format(len(more))
+    return [heading("Limits"), bullets([*first, *[link] * bool(more)])]
 
 
 def _more_limits(report: Report, _: Figures) -> Blocks:
     yield heading("Limits")
     if report.results.study.would_change:
         yield Markdown("**What would change the answer.** {}").format(report.results.study.would_change)
-    yield bullets(limits(report)[FIRST:])
+    yield bullets(limits(report)[1])
 
 
-def limits(report: Report) -> list[Markdown]:
-    """How far the answer goes, what matters most first: the sample, the displays, who has the form of the bench, and
-    what was tuned on what."""
+def limits(report: Report) -> tuple[list[Markdown], list[Markdown]]:
+    """How far the answer goes, what matters most first, and the rest: the sample, the displays, who has the form of the
+    bench; then what was tuned on what."""
     study, own = report.results.study, getattr(story_of(report.results), "LIMITS", ())
     given = {"Measured": report.results.text.caution, "Published": study.reported and f"{study.reported.source}."}
     given["Note"] = study.note
-    texts = [*remarks(report.results), _sample(report), *_displays(report), *_form(report), *own]
+    texts = [*remarks(report.results), *filter(None, [uncovered(report.records), edited(report.records)])]
+    texts += [_sample(report), *_displays(report), *_form(report), *own]
     texts += [f"{name}: {text}" for name, text in given.items() if text]
-    texts += filter(None, [uncovered(report.records), edited(report.records)])
-    texts += [*_weights(report), *_tuned(report), *_lpips(report)]
-    return [Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in texts]
+    first, more = texts[:FIRST], [*texts[FIRST:], *_weights(report), *_tuned(report), *_lpips(report)]
+    named = [[Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in some] for some in (first, more)]
+    return named[0], named[1]
 
 
 def _sample(report: Report) -> str:
@@ -345,7 +346,7 @@ def _tests(report: Report, _: Figures) -> Blocks:
             "method": marked(test.second),
             "display": test.condition,
             f"mean difference{score.brackets}": score.estimate(test.estimate, signed=True),
-            "better on": f"{test.better(score.sign)} of {sample(test.estimate, len(results.targets))}",
+            "better on": f"{test.better(score.sign)} of {test.estimate.n}",
             f"could show{score.brackets}": score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
             "p": "no test" if np.isnan(test.p) else f"{test.p:.4f}",
         }
