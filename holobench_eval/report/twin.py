@@ -26,7 +26,7 @@ from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .data.statistics import Estimate, mean_interval
 from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
-from .sections.diagnosis import quantities
+from .stories.training import quantities
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"

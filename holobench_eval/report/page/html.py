@@ -23,16 +23,13 @@ from markupsafe import Markup
 
 from ...core.io import write_atomically
 from ..markdown import blocks, captions
-from ..sections.answer import counts
-from ..sections.setup import environment
-from ..stories import parts
-from ..story import Report
+from ..stories.overview import ANSWER, LIMITATIONS, counts, environment
+from ..story import Part, Report
 from .data import page_data
 from .pictures import pictures
 
 MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the provenance may take beside scripts, data and pictures
-TOP, BOTTOM = "answer", "limits"  # sections of report.md that stand first and last
 CHARTS = ("quality-*", "error-budget*", "sweep-*", "training-*", "stages-*")  # figures of the report that the page has
 SCRIPTS = ("dom", "state", "pixels", "flip", "table", "viewer", "strip", "main")
 
@@ -66,8 +63,8 @@ def page(report: Report) -> str:
         policy=policy(scripts, style),
         style=Markup(style),
         counts=counts(report.results),
-        top=section_html(report, TOP),
-        limits=section_html(report, BOTTOM),
+        top=part_html(report, ANSWER),
+        limits=part_html(report, LIMITATIONS),
         charts=charts,
         environment=environment(report.provenance),  # times and revisions stand in provenance.json
         description=report.description,
@@ -92,13 +89,12 @@ def policy(scripts: list[str], style: str) -> str:
     )
 
 
-def section_html(report: Report, name: str) -> Markup:
-    """A section of report.md as HTML; links, which lead out of the page, are a text and a name in brackets.
+def part_html(report: Report, part: Part) -> Markup:
+    """A part of report.md as HTML; links, which lead out of the page, are a text and a name in brackets.
 
     Columns of numbers get a class, since the policy takes no style of an element.
     """
-    chosen = [section for section in parts() if getattr(section, "name", "") == name and section.applies(report)]
-    text = blocks(block for section in chosen for block in section.render(report, []))
+    text = blocks(part.render(report, [])) if part.applies(report) else ""
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
     tokens = reader.parse(_LINK.sub(r"\1 (\2)", str(text)))
     for token in tokens:

@@ -12,10 +12,8 @@ A story is a module of this folder with these names, all optional but the first:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
-from types import SimpleNamespace
 from typing import Any
 
 from ..data.results import Results
@@ -28,30 +26,7 @@ MOST_WORDS = 40  # of a verdict
 def stories() -> list[Any]:
     """Every story, in order."""
     modules = (import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__))
-    return sorted([*modules, *_unmoved()], key=lambda module: module.ORDER)
-
-
-def _unmoved() -> Iterator[Any]:
-    """Until all are moved: what is left of answers and sections, as stories."""
-    from .. import answers, sections
-
-    orders = {"error_budget": 10, "prediction": 30, "focus": 40, "ranks": 50, "sweeps": 60, "over_displays": 70}
-    for module in iter_modules(answers.__path__):
-        if module.name in orders:
-            file, order = import_module(f"{answers.__name__}.{module.name}"), orders[module.name]
-            for kind, place in ((file.KIND, order),):
-                yield SimpleNamespace(
-                    ORDER=place,
-                    QUESTION=kind.question,
-                    applies=kind.applies,
-                    verdicts=kind.verdicts,
-                    table=kind.table,
-                    LIMITS=kind.limits,
-                    KIND=kind,
-                )
-    for module in iter_modules(sections.__path__):
-        file = import_module(f"{sections.__name__}.{module.name}")
-        yield SimpleNamespace(ORDER=200, PARTS=file.SECTIONS)
+    return sorted(modules, key=lambda module: module.ORDER)
 
 
 def story_of(results: Results) -> Any:
@@ -72,5 +47,5 @@ def answer(results: Results) -> list[str]:
 
 def parts() -> list[Part]:
     """Every part, those of report.md first, in the order of their file."""
-    every = (part for story in stories() for part in getattr(story, "PARTS", ()))
-    return sorted(every, key=lambda part: (part.details, part.order))
+    known = (part for story in stories() for part in getattr(story, "PARTS", ()))
+    return sorted(known, key=lambda part: (part.details, part.order))

@@ -83,9 +83,9 @@ def _leads(results: Results, row: Row, tied: list[str]) -> str:
 def _against(results: Results, row: Row) -> str:
     """``+1.30 dB [+0.43, +2.17]``, what it is the difference to, and whether that is shown."""
     assert row.test is not None
-    shown = {"not shown to differ": ", not shown", "not tested": ", untested"}
+    doubts = {"not shown to differ": ", not shown", "not tested": ", untested"}
     text = difference(results.headline, row.test.estimate)
-    return f"{text}{OTHER}{shown.get(verdict(results.headline, row.test), '')}"
+    return f"{text}{OTHER}{doubts.get(verdict(results.headline, row.test), '')}"
 
 
 def published(results: Results, label: str, condition: str) -> float | None:

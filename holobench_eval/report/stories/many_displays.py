@@ -85,10 +85,10 @@ def margins(results: Results) -> list[Margin]:
             both = ([results.values(row, name) for name in where] for row in (label, str(layout.baseline)))
             differences = np.subtract(*both)
             tests = [test for test in results.against_baseline if test.second == label and test.condition in where]
-            shown = [sign * test.estimate.mean for test in tests if test.is_shown]
+            clear = [sign * test.estimate.mean for test in tests if test.is_shown]
             by_cluster = differences @ shares
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
-            better, worse = sum(gain > 0 for gain in shown), sum(gain < 0 for gain in shown)
+            better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
             rows.append(Margin(label, differences.mean(1), over_both, better, worse))
     return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 

@@ -1,1 +1,0 @@
-"""Until all answers are stories: what is left of them."""

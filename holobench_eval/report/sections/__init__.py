@@ -1,1 +1,0 @@
-"""Until all sections are stories: what is left of them."""

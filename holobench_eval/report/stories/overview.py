@@ -1,0 +1,436 @@
+"""What all reports have: the question and its answer, what the answer rests on, how far it goes, and what was measured.
+
+report.md has the first page and the limits; details.md has the setup, the paired tests, the holes and the environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...study.plan import is_reference
+from ..charts import paired
+from ..charts.tiles import draw_rows
+from ..data.board import board
+from ..data.layout import FLOOR
+from ..data.phrases import edited, remarks, too_few, uncovered
+from ..data.results import Results
+from ..data.statistics import FEWEST, POWER, SIGNIFICANCE
+from ..data.tables import DONE
+from ..data.text import FILES, grouped, plain, sample, words
+from ..markdown import Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
+from ..story import Blocks, Figures, Part, Report, is_many, subjects
+from . import answer, comparison, many_displays, story_of
+from .alignment import agreement
+from .training import trainings
+
+ORDER = 0
+PICTURES = "answer-pictures.jpg"
+MOST_TILES = 6  # in the row of pictures, beside the target
+MOST_NAMED = 4  # displays of one basis
+FIRST = 5  # limits that stand in report.md; the others are in details.md
+TARGETS_NAMED = 40
+WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
+
+
+def _title(report: Report, _: Figures) -> Blocks:
+    return [heading(report.layout.title, 1), beginning(report.layout.question or story_of(report.results).QUESTION)]
+
+
+def _answer(report: Report, _: Figures) -> Blocks:
+    return [heading("Answer"), bullets(answer(report.results))]
+
+
+def _table(report: Report, _: Figures) -> Blocks:
+    return [getattr(story_of(report.results), "table", comparison.table)(board(report.results))]
+
+
+def _plots(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
+    """Differences to the baseline on some of the displays that have any."""
+    for condition, stem in paired.displays(report.results)[some]:
+        path = report.figures / f"quality-paired-{stem}.png"
+        yield path, paired.draw(report.results, condition, path)
+
+
+def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
+    """A target, and its captures by the methods that are ``chosen``."""
+    results, thumbnails, text = report.results, report.thumbnails, report.layout.text
+    for condition in [name for name in results.conditions if results.has_pictures(name)][:1]:
+        known = thumbnails.targets(condition)
+        target = thumbnails.middle(condition) if known else ""
+        labels = chosen(results, condition) if known else []
+        tiles = [(report.layout.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
+        if any(tile.picture is not None for _, tile in tiles):
+            middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
+            which, path = f"{text.scored.capitalize()}s of {target}{middle}", report.figures / PICTURES
+            draw_rows(path, condition, (target, known[target]), [("", tiles)])
+            yield path, f"{which}, on {condition}. {text.picture}. Left: the {text.truth}."
+
+
+def chosen(results: Results, condition: str) -> list[str]:
+    """All methods where they are few; else the best of each group, those of the question, and the baseline."""
+    display = next(each for each in board(results).displays if each.name == condition)
+    firsts = [rows[0].label for _, rows in display.groups]
+    wanted = {*firsts, *subjects(results), results.layout.baseline}
+    return [row.label for row in display.rows if len(display.rows) <= MOST_TILES or row.label in wanted]
+
+
+def _stages(report: Report) -> Iterator[tuple[Path, str]]:
+    """Pictures of the bench's stages, drawn before the report, where they are."""
+    for name in dict.fromkeys(report.results.frame["display"]):
+        path = report.figures / f"stages-{name}.png"
+        if path.is_file():
+            yield path, f"Stages of the simulated bench {name}."
+
+
+def _limits(report: Report, _: Figures) -> Blocks:
+    known = limits(report)
+    more = Markdown("[{} more](details.md#limits)").format(len(known) - FIRST)
+    return [heading("Limits"), bullets([*known[:FIRST], *[more] * (len(known) > FIRST)])]
+
+
+def _more_limits(report: Report, _: Figures) -> Blocks:
+    yield heading("Limits")
+    if report.layout.would_change:
+        yield Markdown("**What would change the answer.** {}").format(report.layout.would_change)
+    yield bullets(limits(report)[FIRST:])
+
+
+def limits(report: Report) -> list[Markdown]:
+    """How far the answer goes, what matters most first: the sample, the displays, who has the form of the bench, and
+    what was tuned on what."""
+    layout, own = report.layout, getattr(story_of(report.results), "LIMITS", ())
+    given = {"Measured": layout.text.caution, "Published": layout.reported_source and f"{layout.reported_source}."}
+    given["Note"] = layout.note
+    texts = [*remarks(report.results), _sample(report), *_form(report), *own, *_displays(report)]
+    texts += [f"{name}: {text}" for name, text in given.items() if text]
+    texts += filter(None, [uncovered(report.records), edited(report.records)])
+    texts += [*_weights(report), *_tuned(report), *_seconds(report), *_lpips(report)]
+    return [Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in texts]
+
+
+def _sample(report: Report) -> str:
+    results, targets = report.results, len(report.results.targets)
+    trained = ", nor with another training" * bool(report.once(trainings))
+    size = f"{targets} target{'s' * (targets != 1)}{_among(results)}"
+    kind = "of how a mean varies with other pictures of the kind, not with other displays"
+    parts = [f"{size}; brackets are {kind}{trained}."]
+    tests = sum(np.isfinite(test.p) for test in results.against_baseline)
+    if few := too_few(results):
+        parts.append(few)
+    elif tests:
+        parts.append(
+            f"Shown: p < {SIGNIFICANCE} by sign flips, adjusted for {tests} comparison{'s' * int(tests > 1)} with "
+            f"{results.layout.baseline}; not shown does not mean that there is none."
+        )
+    elif len(set(results.clusters)) < FEWEST:
+        parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
+    if holes := int((results.holes["category"] != FLOOR).sum()):
+        parts.append(f"{holes} planned cells have no score (details.md says why).")
+    return f"Sample: {' '.join(parts)}"
+
+
+def _among(results: Results) -> str:
+    """In how many clusters the targets are, where these are fewer."""
+    clusters = len(set(results.clusters))
+    return f" in {clusters} cluster{'s' * (clusters > 1)}" if clusters < len(results.targets) else ""
+
+
+def _displays(report: Report) -> Iterator[str]:
+    displays = report.description.displays
+    for basis, names in grouped((each.basis or each.heading, each.name) for each in displays).items():
+        yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
+    for label, model in report.description.models.items():
+        yield f"{label}: descends through {model}."
+    if report.layout.measure == FILES:
+        yield "Display: real, and known from its photographs alone."
+
+
+def _form(report: Report) -> Iterator[str]:
+    """Which methods fit a model that has the bench's own equations for some of its effects."""
+    shares = grouped(
+        (label, share)
+        for display in report.description.displays
+        for label, share in display.modelled.items()
+        if share[0] and label in report.results.methods(display.name)
+    )
+    ends = {
+        label: dict.fromkeys(f"{own} of {of}" for own, of in (min(each), max(each))) for label, each in shares.items()
+    }
+    known = grouped((" to ".join(both), label) for label, both in ends.items())
+    if parts := [f"{words(labels)} for {count}" for count, labels in known.items()]:
+        yield f"Inverse crime: effects modelled by the simulation's own equations: {'; '.join(parts)}; expect less."
+
+
+def _tuned(report: Report) -> Iterator[str]:
+    same = grouped((text, label) for label, text in report.layout.tuned.items())
+    if parts := [f"of {words(labels)}, {text}" for text, labels in same.items()]:
+        others = "The others have the settings of their papers, of this package or of the config."
+        yield f"Tuned: {'; '.join(parts)}. {others}"
+
+
+def _weights(report: Report) -> Iterator[str]:
+    """Weights of others that the trained methods of the question take where a machine has them, and that it had not."""
+    lacking = dict[tuple[tuple[str, ...], str], None]()
+    for training in report.once(trainings):
+        files = training.fact("description", dict, {}).get("external") or {}
+        absent = tuple(name for name, digest in files.items() if digest == "absent")
+        asked = [label for label in training.labels if absent and label in subjects(report.results)]
+        lacking |= {(absent, label): None for label in asked}
+    for absent, labels in grouped(lacking).items():
+        yield f"Weights: without {words(list(absent))}, which this machine has not, learned {words(labels)}."
+
+
+def _seconds(report: Report) -> Iterator[str]:
+    """Whether solutions were timed beside other work."""
+    done, workers = report.results.done, int(report.provenance.get("workers") or 1)
+    alone = done["timed_alone"] == 1 if "timed_alone" in done else np.zeros(len(done), dtype=bool)
+    if alone.any():
+        beside = sorted({*done["label"][done["category"] != FLOOR]} - {*done["label"][alone]})
+        but = f", but for {words(beside)}" * bool(beside)
+        yield f"Seconds: of holograms that were solved with nothing beside them{but}."
+    elif workers > 1:
+        yield f"Seconds: of {workers} workers side by side, so longer than alone."
+
+
+def _lpips(report: Report) -> Iterator[str]:
+    """Why LPIPS is missing where it was wanted, and how to have it."""
+    wanted, scored = report.layout.metrics, " ".join(score.metric for score in report.results.scores)
+    if (wanted is None or "lpips" in " ".join(wanted)) and "lpips" not in scored:
+        yield (
+            f"LPIPS: left out, since no package contains the weights of its trunk. Put {WEIGHTS} into the folder "
+            "checkpoints of torch's hub cache and run again."
+        )
+
+
+def _reproduce(report: Report, _: Figures) -> Blocks:
+    description = report.description
+    yield heading("Reproduce")
+    yield code_block(description.command or f"holoeval run {description.config_file or 'CONFIG.yaml'}")
+    yield Markdown("{} [details.md](details.md): displays, methods, trainings, tests, config. {}").format(
+        counts(report.results), "table.csv, records.csv: every mean and every cell."
+    )
+
+
+def counts(results: Results) -> str:
+    """How large the study is, in one sentence."""
+    cells = results.frame[results.frame["category"] != FLOOR]
+    sizes = {"target": len(results.targets), "method": cells["label"].nunique(), "display": len(results.conditions)}
+    size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for noun, count in sizes.items())
+    lost = int((cells["state"] != DONE).sum())
+    cell = "picture" if results.layout.measure == FILES else "cell"
+    return f"{size}: {len(cells)} {cell}s{f', {lost} without a score' if lost else ''}."
+
+
+def _details(report: Report, _: Figures) -> Blocks:
+    yield heading(Markdown("Details: {}").format(report.layout.title), 1)
+    yield Markdown("What [report.md](report.md) rests on, number by number.")
+
+
+def _setup(report: Report, _: Figures) -> Blocks:
+    yield heading("What was measured")
+    yield report.layout.text.procedure
+    yield properties((_from_files if report.layout.measure == FILES else _on_displays)(report).items())
+
+
+def _on_displays(report: Report) -> dict[str, str]:
+    """Name and value of everything that was the same for all methods."""
+    layout, results, cells = report.layout, report.results, [record["cell"] for record in report.records]
+    sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
+    panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
+    rows = dict[str, str]()
+    if layout.predicts:
+        rows["measured"] = f"predictions of the captures of holograms by {layout.holograms}"
+    rows |= {"targets": _targets(results), "dataset": "; ".join(sets)}
+    if given := layout.training:
+        limit = "no limit on captures" if given.captures is None else f"at most {given.captures} captures"
+        watch = f"of which {given.held_out} only watch the training"
+        rows["training images"] = f"{given.images} of {given.dataset}, {watch}; {limit}"
+    return rows | {
+        "panel": "; ".join(panels),
+        "exposure": _distinct(results, "exposure"),
+        "metric protocol": _distinct(results, "protocol"),
+        "repeats": str(results.frame["repeat"].nunique()),
+        "seed": str(layout.seed),
+        "headline metric": results.headline.axis,
+        "baseline": layout.baseline or "none",
+        "registration": _registration(results),
+        "saturated samples of a capture": _saturation(results),
+    }
+
+
+def _from_files(report: Report) -> dict[str, str]:
+    """The same where the pictures were given."""
+    results, cells = report.results, [record["cell"] for record in report.records]
+    panels = [cell["panel"] for cell in cells if cell["panel"] and not is_reference(cell["condition"])]
+    sizes = dict.fromkeys(" x ".join(map(str, panel)) for panel in panels)
+    return {
+        "targets": _targets(results),
+        "size of the captures": f"{'; '.join(sizes)} pixels",
+        "compared": report.layout.text.compared,
+        "metric protocol": _distinct(results, "protocol"),
+        "headline metric": results.headline.axis,
+        "baseline": report.layout.baseline or "none",
+        "saturated samples of a capture": _saturation(results),
+    }
+
+
+def _registration(results: Results) -> str:
+    """How far the geometry was off, display by display, and whether a second aligner agrees."""
+    layout, done = results.layout, results.done
+    if layout.learned_display is not None:
+        return "none: the network predicts in the frame of the target"
+    named = done["condition"].where(~done["condition"].isin(layout.changed), "displays after a change")
+    residuals = [
+        f"{condition} {' to '.join(dict.fromkeys(f'{end:.3f}' for end in (cells.min(), cells.max())))} px"
+        for condition, cells in done.groupby(named, sort=False)["registration_residual_px"]
+        if cells.notna().any()
+    ]
+    text = f"rms residual, in pixels of the scored region: {', '.join(residuals)}" if residuals else "not recorded"
+    return f"{text}. {agreement(results)}" if layout.real else text
+
+
+def _saturation(results: Results) -> str:
+    if results.layout.learned_display is not None:
+        return "none: there is no sensor"
+    most = float(results.done["saturated"].max())
+    return f"at most {100 * most:.3g} %" if most >= 0 else "not recorded"
+
+
+def _targets(results: Results) -> str:
+    more, names = len(results.targets) - TARGETS_NAMED, ", ".join(results.targets[:TARGETS_NAMED])
+    return f"{len(results.targets)}{_among(results)}: {names}{f' and {more} more' if more > 0 else ''}"
+
+
+def _distinct(results: Results, column: str) -> str:
+    return ", ".join(sorted(set(results.frame[column]) - {""}))
+
+
+def _described(report: Report, _: Figures) -> Blocks:
+    displays = report.description.displays
+    yield heading("Displays and methods")
+    yield report.layout.text.displays if displays else "No description of the displays was recorded."
+    for display in displays:
+        yield heading(f"Display {display.name}", 3)
+        yield display.heading
+        yield bullets(display.lines)
+    yield heading("Methods", 3)
+    # label, registered name and parameters of each, in the order of the tables
+    cells, rows, known = {record["label"]: record["cell"] for record in report.records}, [], report.results.table
+    for label in known.loc[known["category"] != FLOOR, "label"].unique():
+        cell = cells[label]
+        limit = f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
+        rows.append([label, code(cell["method"]), f"{plain(cell['params'])}{limit}"])
+    yield table(["method", "registered as", "parameters"], rows)
+
+
+def _tests(report: Report, _: Figures) -> Blocks:
+    """The paired tests against the baseline."""
+    results, score, marked = report.results, report.results.headline, report.layout.marked
+    tests = results.against_baseline
+    yield heading("Paired tests")
+    if not tests:
+        yield "There are no comparisons with a baseline."
+        return
+    yield (
+        f"Differences to the baseline {report.layout.baseline}, target by target, repeats averaged first: "
+        f"{score.axis}{report.layout.text.axis}. Two-sided sign-flip min-p test (step-down) over "
+        f"clusters of targets; each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this "
+        "table, in which the oracle has none; intervals are not adjusted. At "
+        f"p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
+        f'"Could show": what a test of this comparison alone shows with {100 * POWER:.0f} % power. '
+        f"Pairs with a hole are omitted and counted. Fewer than {FEWEST} clusters give no test and no interval."
+    )
+    yield table_of(
+        [
+            {
+                "comparison": f"{marked(test.second)} – {marked(test.first)}",
+                "display": test.condition,
+                "complete pairs": sample(test.estimate, len(results.targets)),
+                f"mean difference{score.brackets}": score.estimate(test.estimate, signed=True),
+                f"median{score.brackets}": score.number(test.median, signed=True),
+                "better on": f"{test.better(score.sign)} of {test.estimate.n}",
+                f"could show{score.brackets}": score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
+                "p": "no test" if np.isnan(test.p) else f"{test.p:.4f}",
+                "difference": "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
+            }
+            for test in tests
+        ]
+    )
+
+
+def _holes(report: Report, _: Figures) -> Blocks:
+    """Every cell without a score, with its reason."""
+    holes = report.results.holes[["label", "condition", "target", "repeat", "state", "reason"]]
+    holes = holes.rename(columns={"label": "method", "condition": "display"})
+    holes = holes.assign(
+        repeat=holes["repeat"].map("{:.0f}".format), reason=holes["reason"].replace("", "no reason given")
+    )
+    yield heading("Holes")
+    if holes.empty:
+        yield "None: every planned cell has a score."
+    else:
+        yield "Cells without a score. They enter no mean, and a method without a score for every target is not ranked."
+        yield table_of(holes.to_dict("records"))
+
+
+def _environment(report: Report, _: Figures) -> Blocks:
+    description = report.description
+    yield heading("Config and environment")
+    if description.config_text:
+        yield Markdown("The config, {}:").format(code(description.config_file))
+        yield code_block(description.config_text)
+    rows = environment(report.provenance)
+    yield properties(rows) if rows else "The environment was not recorded."
+
+
+def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the run used, as far as it is the same for two equal runs: no times, no paths, no revisions."""
+    single = {"package": "holobench_eval", "python": "Python", "platform": "platform", "cpu": "processor", "gpu": "GPU"}
+    numbers = {"threads": "threads per worker", "workers": "workers", "config_sha256": "sha256 of the config"}
+    named = [(title, str(provenance[key])) for key, title in (single | numbers).items() if key in provenance]
+    return [*named, *((name, str(value)) for name, value in provenance.get("packages", {}).items())]
+
+
+def _has_displays(report: Report) -> bool:
+    return bool(report.results.conditions)
+
+
+def _has_scores(report: Report) -> bool:
+    values = report.results.table.get(report.results.headline.column)
+    return _has_displays(report) and values is not None and bool(np.isfinite(values).any())
+
+
+def _has_plot(report: Report) -> bool:
+    own = report.layout.measure == "error_budget" or any(part.applies(report) for part in many_displays.PARTS)
+    return _has_scores(report) and not own
+
+
+ANSWER = Part(2, _answer, applies=_has_displays)
+LIMITATIONS = Part(75, _limits, applies=_has_displays)
+PARTS = (
+    Part(0, _title),
+    ANSWER,
+    Part(3, _table, applies=_has_scores),
+    Part(4, applies=_has_plot, figures=lambda report: _plots(report, slice(1))),
+    Part(6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
+    LIMITATIONS,
+    Part(210, _reproduce),
+    Part(1, _details, details=True),
+    Part(5, _more_limits, applies=_has_displays, details=True),
+    Part(10, _setup, details=True),
+    Part(20, _described, applies=lambda report: report.layout.measure != FILES, details=True),
+    Part(
+        30,
+        applies=lambda report: _has_scores(report) and not is_many(report.results),
+        figures=lambda report: _plots(report, slice(1, None)),
+        details=True,
+    ),
+    Part(90, figures=_stages, details=True),
+    Part(120, _tests, details=True),
+    Part(190, _holes, details=True),
+    Part(220, _environment, details=True),
+)
