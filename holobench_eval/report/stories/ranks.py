@@ -82,13 +82,14 @@ class Ranks:
     @cached_property
     def pairs(self) -> pd.DataFrame:
         """Every two ranked methods, the nominally better one first: by how much it is, nominally and in each draw,
-        and in how many draws the order is the other way; a tie is no order."""
+        and in how many draws the order is the other way, most often first; a tie is no order."""
         rows = []
         for first, second in itertools.combinations(self.quality, 2):
             nominal, *draws = self.quality[first] - self.quality[second]
             flips = int((np.sign(draws) * np.sign(nominal) < 0).sum())
             rows.append((first, second, nominal, np.array(draws), flips))
-        return pd.DataFrame(rows, columns=["first", "second", "nominal", "draws", "flips"])
+        pairs = pd.DataFrame(rows, columns=["first", "second", "nominal", "draws", "flips"])
+        return pairs.sort_values("flips", ascending=False, kind="stable")
 
     def share(self, draws: int) -> Estimate:
         """A share of the draws with its 95 % interval (Wilson 1927)."""
@@ -105,14 +106,12 @@ class Ranks:
         None for nothing that was drawn."""
         known = dict[str, Array]()
         for name, column in self.drawn.items():
-            parameter, values = PARAMETERS[str(name)], column.to_numpy()
+            given, values = PARAMETERS[str(name)], column.to_numpy()
             if name in CIRCULAR:
-                known[f"sine of the {parameter.words}"] = np.sin(values)
-                known[f"cosine of the {parameter.words}"] = np.cos(values)
+                known |= {f"sine of the {given.words}": np.sin(values), f"cosine of the {given.words}": np.cos(values)}
                 continue
-            known[parameter.words] = values
-            if parameter.low < 0 < parameter.high:
-                known[f"size of the {parameter.words}"] = np.abs(values)
+            known[given.words] = values
+            known |= {f"size of the {given.words}": np.abs(values)} if given.low < 0 < given.high else {}
         strongest = cause(differences, known)
         return strongest if strongest and strongest.is_clear else None
 
@@ -133,22 +132,19 @@ def verdicts(results: Results) -> Iterator[str]:
     if not existing:
         yield "Methods with all scores tie before any draw or in each of them, so there is no ranking to compare."
     for each in existing:
-        display, nominal = each.swept.before, each.ranks.loc[0]
+        display, nominal, score = each.swept.before, each.ranks.loc[0], results.headline
         leaders = list(nominal.index[nominal == 1])
+        turned = (
+            pair for pair in each.pairs.itertuples() if pair.flips and score.number(abs(pair.nominal)).strip("0.")
+        )
+        passes = [
+            f"; {pair.second} passes {pair.first} most often, on {percent(each.share(pair.flips))} %" for pair in turned
+        ]
         yield (
             f"{f'{display}: ' * (len(existing) > 1)}{words(leaders)}, first on {display}, is first on "
             f"{percent(each.first(leaders[0]))} % of its draws; Kendall's tau with its ranking is "
-            f"{bracketed(each.tau, '.2f')}{_turning(each)}."
+            f"{bracketed(each.tau, '.2f')}{''.join(passes[:1])}."
         )
-
-
-def _turning(each: Ranks) -> str:
-    score = each.results.headline
-    apart = [pair for pair in each.pairs.itertuples() if pair.flips and score.number(abs(pair.nominal)).strip("0.")]
-    if not apart:
-        return ""
-    most = max(apart, key=lambda pair: pair.flips)
-    return f"; {most.second} passes {most.first} most often, on {percent(each.share(most.flips))} %"
 
 
 def table(board: Board) -> Markdown | None:
@@ -210,8 +206,8 @@ def left_out(each: Ranks) -> Iterator[str]:
 
 def flips(each: Ranks) -> Iterator[dict[str, str]]:
     """Of the pairs whose order is the other way in some draw, most often first: by how much, and what it goes with."""
-    score, turning = each.results.headline, each.pairs[each.pairs["flips"] > 0]
-    for pair in turning.sort_values("flips", ascending=False, kind="stable").itertuples():
+    score = each.results.headline
+    for pair in each.pairs[each.pairs["flips"] > 0].itertuples():
         cause, text = each.cause(pair.draws), "nothing drawn"
         if cause:
             text = f"{cause.parameter} (rank correlation {cause.rho:+.2f}, R2 {cause.explained:.2f})"
@@ -253,11 +249,7 @@ def figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _drawn_from(report: Report) -> bool:
-    return applies(report.results)
-
-
 PARTS = (
-    Part(47, applies=_drawn_from, figures=figures),
-    Part(60, _render, applies=_drawn_from, details=True),
+    Part(47, applies=lambda report: applies(report.results), figures=figures),
+    Part(60, _render, applies=lambda report: applies(report.results), details=True),
 )
