@@ -45,7 +45,6 @@ class Ranks:
     quality: mean headline, turned so that larger is better, a column a ranked method, nominally best first; a row for
     the display (0) and one for each draw (from 1) in which all of them have every target. ranks: the same as places
     from 1; equal means share the better one. unranked: methods without every target nominally and in enough draws.
-    taus: Kendall's tau-b of each draw's ranking against the nominal one, without draws in which all methods tie.
     drawn: the parameters of these draws, a column each.
     """
 
@@ -59,11 +58,15 @@ class Ranks:
         enough = quality.loc[0].notna() & known.any() & (known.sum() >= ENOUGH * known.any(axis=1).sum())
         self.unranked = [label for label in labels if not enough[label]]
         best_first = quality.loc[0, enough].sort_values(ascending=False, kind="stable").index
-        self.quality = quality[best_first].dropna()
+        self.quality = quality[best_first].dropna() if len(best_first) else quality.iloc[:1, :0]
         self.ranks = self.quality.rank(axis=1, method="min", ascending=False)
-        taus = [stats.kendalltau(self.quality.loc[0], row).statistic for _, row in self.quality[1:].iterrows()]
-        self.taus = np.array([tau for tau in taus if np.isfinite(tau)])
         self.drawn = pd.DataFrame(swept.drawn, range(1, len(swept.drawn) + 1)).reindex(self.quality.index[1:])
+
+    @cached_property
+    def taus(self) -> Array:
+        """Kendall's tau-b of each draw's ranking against the nominal one, without draws in which all methods tie."""
+        taus = [stats.kendalltau(self.quality.loc[0], row).statistic for _, row in self.quality[1:].iterrows()]
+        return np.array([tau for tau in taus if np.isfinite(tau)])
 
     @property
     def exists(self) -> bool:
