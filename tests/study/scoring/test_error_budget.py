@@ -9,7 +9,7 @@ import pytest
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.report import layout_of
-from holobench_eval.report.data.error_budget import Budget, budgets
+from holobench_eval.report.stories.error_budget import Budget, budgets
 from holobench_eval.report.data.results import Results
 from holobench_eval.report.data.tables import records_frame
 from holobench_eval.study.config import load_study
