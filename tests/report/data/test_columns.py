@@ -17,7 +17,7 @@ from holobench_eval.report.data.tables import read_records, records_frame
 from holobench_eval.report.files.dictionary import File, dictionary
 from holobench_eval.report.files.dictionary import column as described
 from holobench_eval.report.page.data import page_data
-from holobench_eval.report.section import Report
+from holobench_eval.report.story import Report
 from tests.support import budget_study as budget
 
 REPORTS = Path(__file__).parents[3] / "reports"
