@@ -118,7 +118,11 @@ def _roles(report: Report, conditions: list[str], target: str) -> Iterator[Cell]
     """The best method of a display, the baseline and the oracle."""
     results = report.results
     for condition in conditions:
-        roles = (*results.ranking(condition)[:1], results.baseline, *results.ranking(condition, categories=(ORACLE,))[:1])
+        roles = (
+            *results.ranking(condition)[:1],
+            results.baseline,
+            *results.ranking(condition, categories=(ORACLE,))[:1],
+        )
         for label in dict.fromkeys(role for role in roles if role in results.methods(condition)):
             yield str(label), condition, target
 

@@ -66,7 +66,11 @@ def _named(results: Results, condition: str) -> Iterator[str]:
 
 def _reported(results: Results, condition: str) -> Iterator[str]:
     """The place of the row that was published as the first."""
-    published = {label: row["psnr"] for label, row in (results.study.reported.rows if results.study.reported else {}).items() if "psnr" in row}
+    published = {
+        label: row["psnr"]
+        for label, row in (results.study.reported.rows if results.study.reported else {}).items()
+        if "psnr" in row
+    }
     ranked = [label for label in results.ranking(condition) if label in published]
     if len(ranked) > 1 and condition == (results.facts.beside or condition):
         first = max(ranked, key=published.__getitem__)

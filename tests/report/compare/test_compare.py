@@ -11,8 +11,8 @@ import pytest
 from holobench_eval.core.errors import UserError
 from holobench_eval.report.compare.page import csv, markdown
 from holobench_eval.report.compare.paired import Comparison, Unpaired, compare, provenance_differences, read_run
-from holobench_eval.report.statistics import family_p, mean_interval
 from holobench_eval.report.results import csv_text
+from holobench_eval.report.statistics import family_p, mean_interval
 from tests.support.records_on_disk import Scores, write_report
 
 SCORES = {("toy", "bench"): [20.0, 21.0, 22.0]}

@@ -14,14 +14,13 @@ import pytest
 
 from holobench_eval.core.hashing import digest
 from holobench_eval.report import Description, Results, read_records, records_frame
-from holobench_eval.report.scores import parse
 from holobench_eval.report.markdown import Markdown, table
 from holobench_eval.report.page import html
 from holobench_eval.report.page import pictures as module
-from holobench_eval.report.page.html import BOTTOM, MOST_BYTES, TOP, json_text
+from holobench_eval.report.page.html import MOST_BYTES, json_text
 from holobench_eval.report.page.pictures import TARGETS_IN_FULL, keep_copies, pictures
-from holobench_eval.report.section import Report, Section
-from holobench_eval.report.sections import sections
+from holobench_eval.report.scores import parse
+from holobench_eval.report.story import Part, Report
 from holobench_eval.study.plan import REFERENCE
 from holobench_eval.study.store import Store
 from tests.report.elements import Elements
@@ -58,7 +57,6 @@ def test_every_element_that_loads_something_has_it_within_and_the_page_is_small(
     assert all(value.startswith("data:") for value in elements.values("src", "srcset", "data", "action", "poster"))
     assert all(value.startswith(("#", "data:")) for value in elements.values("href"))
     assert not {"iframe", "object", "embed", "base", "form action"} & {tag for tag, _ in elements.found}
-    assert {section.name for section in sections()} >= {TOP, BOTTOM}
     assert "<h2>Answer</h2>" in written.text
     assert (written.folder / "report.html").stat().st_size < MOST_BYTES
 
@@ -73,12 +71,10 @@ def test_the_policy_names_the_hash_of_every_script_and_of_the_style(written: Wri
         assert f"'sha256-{digest}'" in elements.policy
 
 
-def test_tables_at_the_top_have_no_style_of_their_own_and_links_are_texts(written: Written, monkeypatch) -> None:
+def test_tables_at_the_top_have_no_style_of_their_own_and_links_are_texts(written: Written) -> None:
     results = Results(read_records((written.folder / "records.csv").read_text()), written.layout)
     report = Report(results, [], written.folder, {}, Description())
-    section = Section(TOP, 1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]]), MORE])
-    monkeypatch.setattr(html, "sections", lambda: [section])
-    text = html.section_html(report, TOP)
+    text = html.part_html(report, Part(1, lambda report, figures: [table(["method", "dB"], [["<b>|", "1.0"]]), MORE]))
     assert '<td class="number">1.0</td>' in text
     assert "&lt;b&gt;|" in text
     assert "<p>5 more (details.md)</p>" in text

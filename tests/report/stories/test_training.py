@@ -1,93 +1,26 @@
-"""The first page of a report, and what it tells of trainings."""
+"""What a report tells of trainings and of what trained methods say of their displays, from files of strangers too."""
 
 import json
 import math
 import re
+from typing import Any
 
 import pytest
 
 from holobench_eval.core.hashing import digest
+from holobench_eval.display.estimates import estimate, joined
 from holobench_eval.report import Description, Results, records_frame, table_from_records, write_report
-from holobench_eval.report.answers import kind_of
-from holobench_eval.report.answers.limits import limits
 from holobench_eval.report.charts.curves import MOST, draw_trainings
 from holobench_eval.report.facts import TrainingSet
-from holobench_eval.report.description import Display
 from holobench_eval.report.markdown import blocks
-from holobench_eval.report.section import Report
-from holobench_eval.report.sections import overview
-from holobench_eval.report.sections.training import SECTIONS
-from holobench_eval.study.artifacts import Round, rounds_of
-from tests.report.answers.test_answers import results_of
+from holobench_eval.report.stories.overview import limits
+from holobench_eval.report.stories.training import PARTS, Training, estimates, missing, quantities, verdict
+from holobench_eval.report.story import Report
+from holobench_eval.study.artifacts import Round, TrainingRecord, rounds_of
 from tests.support import synthetic_study as synthetic
 from tests.support.reports import whole
 
 TARGETS = synthetic.TARGETS[1:4]
-DESCRIPTION = Description(
-    displays=(
-        Display(
-            "leto-aged",
-            "Version 1.",
-            (),
-            basis="simulated; x was fitted to published PSNR",
-            modelled={"HIL": (2, 9), "GS": (0, 9)},
-        ),
-    )
-)
-EVIL = "Is HIL <script>alert(1)</script> | better | =cmd?\n\n# No heading"
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> str:
-    folder = tmp_path_factory.mktemp("front")
-    records = synthetic.study(folder, targets=TARGETS)
-    layout = synthetic.layout(
-        targets=TARGETS, question=EVIL, would_change="Another sign.", tuned={"HIL": "the rates were chosen elsewhere"}
-    )
-    return write_report(layout, records, folder, {}, DESCRIPTION)[0].read_text()
-
-
-def test_a_report_is_question_answer_board_plot_pictures_and_limits(page: str) -> None:
-    order = [
-        "# Made-up captures",
-        "Is HIL &lt;script>",
-        "## Answer",
-        "| A | Wirtinger |",
-        "(figures/quality-paired-leto-aged.png)",
-        "(figures/answer-pictures.jpg)",
-        "## Limits",
-        "## Reproduce",
-        "[details.md](details.md)",
-    ]
-    places = [page.index(text) for text in order]
-    assert places == sorted(places)
-    assert len(page.splitlines()) <= 80
-    assert "Is HIL &lt;script>alert(1)&lt;/script> \\| better \\| =cmd? # No heading" in page
-    assert "<script" not in page
-
-
-def test_the_limits_name_sample_holes_inverse_crime_display_and_tuning(page: str) -> None:
-    for phrase in (
-        "- **Sample:** 3 targets; brackets are of how a mean varies with other pictures of the kind",
-        "With 3 clusters no p can be below 0.25: no difference can be shown.",
-        "1 planned cells have no score",
-        "- **Inverse crime:** effects modelled by the simulation's own equations: HIL for 2 of 9; expect less.",
-        "- **leto-aged:** simulated; x was fitted to published PSNR.",
-        "- **Published:** Chakravarthula et al. 2020, Table 3.",
-        "- **Tuned:** of HIL, the rates were chosen elsewhere.",
-    ):
-        assert phrase in page, phrase
-    assert "GS for" not in page
-
-
-def test_of_many_methods_the_best_of_each_group_the_question_and_the_baseline_are_shown() -> None:
-    means = {f"m{number}": 20.0 - number for number in range(8)} | {"old": 5.0, "trained": 1.0}
-    found = results_of(means, question="Is m6 better?", trained=frozenset({"trained"}))
-    assert overview.chosen(found, "bench") == ["trained", "m0", "m6", "old"]
-    few = results_of({"old": 17.0, "new": 16.0})
-    assert overview.chosen(few, "bench") == ["old", "new"]
-
-
 PAIRS = (("GS", "leto-aged"), ("HIL", "leto-aged"), ("U-Net", "leto-aged"))
 TRAINING = TrainingSet("dead_leaves (count = 24, seed = 0)", 24, 4, 200)
 COLUMNS = "round,step,predicted_psnr,captured_psnr,fidelity_psnr,captures,seconds,l1,perceptual,adversarial,total,judge"
@@ -149,8 +82,8 @@ def report_of(found, folder, **changes):
 
 def section_of(found, folder):
     """The text of the section alone, and the files of its figures."""
-    (section,), report = SECTIONS, report_of(found, folder)
-    return str(blocks(section.render(report, []))), [path for path, _ in section.figures(report)]
+    part, report = PARTS[0], report_of(found, folder)
+    return str(blocks(part.render(report, []))), [path for path, _ in part.figures(report)]
 
 
 def test_captures_for_training_are_told_apart_from_those_while_solving(found):
@@ -165,29 +98,6 @@ def test_captures_for_training_are_told_apart_from_those_while_solving(found):
     assert holes["training_captures"].isna().all()
     table = table_from_records(frame, layout())
     assert table.set_index("label").loc["HIL", "learned_sha256"] == "hil" * 16
-
-
-def test_a_study_without_training_has_neither_its_columns_nor_its_section(found, tmp_path):
-    plain = [record for record in found if record["label"] not in ("HIL", "U-Net")]
-    text = written(plain, tmp_path, trained=frozenset(), training=None, pairs=PAIRS[:1])
-    assert "## Training" not in text
-    assert "## Diagnosis" not in text
-    for name in ("records.csv", "table.csv"):
-        assert "training" not in (tmp_path / name).read_text().splitlines()[0]
-
-
-def test_every_round_is_listed_with_its_figures_on_held_out_images(found, tmp_path):
-    keep(tmp_path, "hil", perceptual="oriented filters")
-    keep(tmp_path, "unet")
-    text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
-    assert "| HIL | leto-aged | 140 | 3600 | 20 | 4 | 2 | oriented filters | hilhilhilh |" in text
-    assert "| HIL | 1 | 16 | 120 | 20.50 | 12.70 | 14.70 |" in text
-    assert "| U-Net | 2 | 24 | 200 | 21.25 | 15.50 | 18.12 |" in text
-    assert "(figures/training-1.png)" in text
-    assert (tmp_path / "figures" / "training-1.png").is_file()
-    assert "24 of dead_leaves (count = 24, seed = 0), of which 4 only watch the training; at most 200 captures" in text
-    note = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
-    assert text.index("\n## Limits\n") < note
 
 
 def test_a_training_that_is_not_beside_the_report_or_not_the_right_one_is_said(found, tmp_path):
@@ -238,20 +148,6 @@ def test_few_trainings_have_a_panel_each_and_many_are_left_to_the_table(tmp_path
     assert draw_trainings(tmp_path / "none", [("m", ())]) == []
 
 
-def test_a_prediction_study_never_speaks_of_picture_quality(found, tmp_path):
-    records = [record for record in found if record["label"] != "GS"]
-    holograms = "wirtinger (iterations = 200)"
-    text = written(records, tmp_path, measure="prediction", holograms=holograms, pairs=PAIRS[1:], baseline="HIL")
-    for phrase in (
-        "HIL predicts best (",
-        "It does not measure picture quality",
-        "The patterns are holograms of the targets by wirtinger, the same for all methods.",
-        "predictions of the captures of holograms by wirtinger (iterations = 200)",
-    ):
-        assert phrase in text, phrase
-    assert "captures while solving" not in text
-
-
 def test_a_learned_display_claims_no_camera(found, tmp_path):
     name = "hil trained on leto-aged"
     moved = [
@@ -272,17 +168,6 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         assert phrase in text, phrase
 
 
-def test_two_reports_of_one_training_have_equal_bytes(found, tmp_path):
-    reports = []
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        keep(tmp_path / name, "hil", made=name)
-        text, figures = section_of(found, tmp_path / name)
-        reports.append((text, [path.read_bytes() for path in figures]))
-    assert reports[0] == reports[1]
-    assert len(reports[0][1]) == 1
-
-
 def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_limits(found, tmp_path):
     weights = {"VGG-19 weights": "absent", "LPIPS weights (AlexNet)": "0123"}
     described = description("hil") | {"external": weights}
@@ -293,10 +178,81 @@ def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_l
     keep(tmp_path, "hil", description=described)
     keep(tmp_path, "unet")
 
-    def told(question):
-        report = report_of(records, tmp_path, question=question)
-        return "\n".join(limits(report, kind_of(report.results)))
+    asked, other = (
+        "\n".join(limits(report_of(records, tmp_path, question=question)))
+        for question in ("Is HIL better than U-Net?", "Is U-Net better?")
+    )
+    assert "**Weights:** without VGG-19 weights, which this machine has not, learned HIL." in asked
+    assert "**Weights:**" not in other
 
-    text = told("Is HIL better than U-Net?")
-    assert "**Weights:** without VGG-19 weights, which this machine has not, learned HIL." in text
-    assert "**Weights:**" not in told("Is U-Net better?")
+
+def lines(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """The cells of the table."""
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in str(quantities(rows)).splitlines()]
+
+
+FOUND = [
+    *(estimate("lut_exponent", colour, value) for colour, value in enumerate((1.27, 1.24, 1.21))),
+    *(estimate("undiffracted_phase", colour, 3.1) for colour in range(3)),
+    *(estimate("crosstalk", colour, 0.6) for colour in range(3)),
+]
+TRUTH = [
+    *(estimate("lut_exponent", colour, value) for colour, value in enumerate((1.28, 1.25, 1.22))),
+    *(estimate("undiffracted_phase", colour, -3.1) for colour in range(3)),
+    *(estimate("crosstalk", colour, 0.45) for colour in range(2)),
+]
+
+
+def stated(**facts: object) -> Training:
+    record = TrainingRecord({"description": {"profile": "leto-aged"}, **facts}, ())
+    return Training("parametric", ("parametric",), "leto-aged", record)
+
+
+def test_each_quantity_has_its_estimates_truths_largest_difference_and_stated_error() -> None:
+    rows = list(estimates(stated(estimates=joined(FOUND, TRUTH))))
+    header, _, exponent, phase, crosstalk = lines(rows)
+    assert header[2:] == ["red", "green", "blue", "largest difference", "stated error"]
+    assert exponent[2:] == ["1.270 (1.280)", "1.240 (1.250)", "1.210 (1.220)", "0.010", "0.04"]
+    assert phase[1:3] == ["rad", "3.100 (-3.100)"]
+    assert phase[5] == "0.083"  # the shorter way around
+    assert crosstalk[2:6] == ["0.600 (0.450)", "0.600 (0.450)", "0.600 (–)", "0.150"]
+    assert verdict(rows) == "6 of 8 numbers are within their stated errors; outside: crosstalk."
+
+
+def test_estimates_that_are_all_right_are_said_to_be() -> None:
+    right, unjudged = (estimates(stated(estimates=joined(*each))) for each in ((FOUND[:6], TRUTH), (FOUND, [])))
+    assert verdict(list(right)) == "All 6 numbers are within their stated errors."
+    assert verdict(list(unjudged)).startswith("None of these has a ground truth")
+
+
+def test_methods_that_lack_the_same_are_told_once() -> None:
+    both = [stated(missing=["flicker | strong", "noise"]), stated(missing=["flicker | strong", "noise"])]
+    assert missing(both) == ["leto-aged contains effects that parametric cannot represent: flicker | strong; noise."]
+    assert missing([stated(missing=[])]) == ["leto-aged contains no effect that parametric cannot represent."]
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        {},
+        {"estimates": "many", "missing": "much"},
+        {"estimates": [1, {"name": 2, "value": 1.0}, {"name": "x"}, {"name": "x", "value": 1, "colour": []}]},
+        {"estimates": [{"name": "x", "value": math.nan, "colour": 0}, {"name": "x", "value": True}], "missing": [1]},
+        {"estimates": [{"name": "x", "value": 10**400, "colour": 0}]},
+    ],
+)
+def test_provenance_of_strangers_shows_nothing_and_stops_nothing(facts: dict[str, object]) -> None:
+    for training in (stated(**facts), Training("x", ("x",), "y", None)):
+        assert (list(estimates(training)), missing([training])) == ([], [])
+
+
+def test_numbers_of_a_stranger_are_shown_with_what_is_known_of_them() -> None:
+    rows = [{"name": "hue_of", "value": 2, "colour": None}, {"name": "hue_of", "value": 1.0, "colour": 7, "error": "x"}]
+    known = list(estimates(stated(estimates=rows)))
+    header, _, hue = lines(known)
+    assert header == ["quantity", "unit", "colour 7", "all", "largest difference", "stated error"]
+    assert hue == ["hue of", "", "1.000", "2.000", "–", "–"]
+    assert verdict(known).startswith("None of these")
+    rows = [{"name": "hue_of", "value": 2, "colour": 0}, {"name": "width", "value": 1.0, "colour": None}]
+    known = list(estimates(stated(estimates=rows)))  # the only laser has no column of its own
+    assert lines(known)[0] == ["quantity", "unit", "all", "largest difference", "stated error"]

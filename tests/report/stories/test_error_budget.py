@@ -1,13 +1,11 @@
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from holobench_eval.metrics import error_budget as scores
-from holobench_eval.report import Description, write_report
-from holobench_eval.report.data.error_budget import budgets
 from holobench_eval.report.results import Results
+from holobench_eval.report.stories.error_budget import budgets
 from tests.support import synthetic_study as synthetic
 
 METHODS = ("terms", "network", "field")
@@ -75,10 +73,3 @@ def test_a_target_without_noise_is_left_out_of_what_noise_allows(monkeypatch: py
 
 def test_a_display_without_all_scores_has_no_budget() -> None:
     assert budgets(results(missing="network")) == []
-
-
-def test_a_report_has_the_figure_and_the_parts_of_the_budget_on_its_first_page(tmp_path: Path) -> None:
-    records = [record(label, target) for target in LEFT for label in METHODS]
-    text = write_report(results().layout, records, tmp_path, {}, Description())[0].read_text()
-    assert text.index("## Answer") < text.index("| temporal noise |") < text.index("(figures/error-budget.png)")
-    assert (tmp_path / "figures" / "error-budget.png").is_file()
