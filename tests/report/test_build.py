@@ -7,7 +7,7 @@ from skimage.io import imread
 
 from holobench_eval.report import Results, records_frame, write_report
 from holobench_eval.report.build import print_figures
-from holobench_eval.report.charts.look.medium import MEDIA
+from holobench_eval.report.charts.look import MEDIA
 from holobench_eval.report.description import Description, Display
 from holobench_eval.report.section import Report
 from tests.support import budget_study as budget

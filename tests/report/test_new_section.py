@@ -12,7 +12,7 @@ from tests.support.reports import whole
 FILE = '''
 """How bright the captures are, which no other section asks."""
 
-from holobench_eval.report.charts.style import new_figure, save
+from holobench_eval.report.charts.look import new_figure, save
 from holobench_eval.report.markdown import bullets, heading
 from holobench_eval.report.section import Section
 

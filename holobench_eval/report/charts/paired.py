@@ -7,20 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ..data import over_displays
 from ..data.results import Results
-from ..data.scores import Score
 from ..data.statistics import Array, Estimate
-from .look.medium import medium
-from .look.methods import Look, looks
-from .style import GREY, grid, legend_below, marks, note, save, slugs, stacked, style
+from .look import GREY, Look, grid, legend_below, looks, medium, note, slugs, stacked
 
 ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
 SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
 DOT, FEW = 9, 12  # size of a target's dot [square points], twice that for so few targets
-NAMES = 0.28  # of the width, for the names of the methods
+NAMES, ABOVE = 0.28, 0.55  # of the width, for the names of the methods: beside the rows, and above narrow ones
 
 
 @dataclass(frozen=True)
@@ -52,10 +48,20 @@ def draw(results: Results, condition: str, path: Path) -> str:
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     _draw(results, path, condition, rows, lines)
     return (
-        f"{results.headline.axis}{results.layout.text.axis}, on {condition}: differences to the baseline "
-        f"{results.layout.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
-        "their 95 % intervals over clusters of targets, not adjusted for the number of comparisons."
+        f"{score.axis}{results.layout.text.axis}, on {condition}: differences to the baseline {baseline}. Small dots: "
+        "targets, at the same height in every row; marks and bars: means and their 95 % intervals over clusters of "
+        "targets, not adjusted for the number of comparisons."
     )
+
+
+def _rows(results: Results, condition: str) -> Iterator[Row]:
+    """A row for every method but the baseline; how many targets have no difference stands in its name."""
+    looked = looks(results.names)
+    for test in results.against_baseline if results.layout.baseline else ():
+        if test.condition == condition and test.estimate.n:
+            name, count = results.layout.marked(test.second), len(results.targets)
+            holes = f", {test.estimate.n} of {count} targets" if test.estimate.n < count else ""
+            yield Row(f"{name}{holes}", test.differences, test.estimate, looked[test.second])
 
 
 def draw_over_displays(results: Results, path: Path) -> str:
@@ -72,55 +78,56 @@ def draw_over_displays(results: Results, path: Path) -> str:
 
 
 def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
-    """Rows of differences to the baseline, which is a line at zero; further lines are dashed."""
-    baseline, score = results.layout.baseline, results.headline
+    """Rows of differences from above to below, with names and numbers; zero is the baseline, further lines are dashed.
+
+    Names stand beside the rows, and above the dots where the figure is narrow.
+    """
+    baseline, score, narrow, width = results.layout.baseline, results.headline, medium().narrow, medium().width
     better = "right" if score.higher_is_better else "left"
     axis = f"difference to {baseline} in {score.axis}{results.layout.text.axis}; better: to the {better}"
-    axis = medium().wrap(axis, 0.6 * medium().width)
+    axis = medium().wrap(axis, (0.9 if narrow else 0.6) * width)
     labels = [f"baseline: {baseline}"]
     labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
-    labels = [medium().wrap(label, 0.8 * medium().width) for label in labels]
-    names = [medium().wrap(row.name, NAMES * medium().width) for row in rows]
-    height = FRAME + len(rows) * max(ROW, LINE * max(name.count("\n") + 1 for name in names))  # all are as high
-    footer = LINE * (axis.count("\n") + sum(label.count("\n") + 1 for label in labels) + 1)
-    with style():
-        figure, (axes,) = stacked([title], [height], footer)
-        _dots(axes, rows, names, score)
+    labels = [medium().wrap(label, 0.8 * width) for label in labels]
+    names = [
+        row.name if medium().height else medium().wrap(row.name, (ABOVE if narrow else NAMES) * width) for row in rows
+    ]
+    tall = LINE * max(_lines(name) for name in names)
+    height = FRAME + len(rows) * (ROW + tall if narrow else max(ROW, tall))  # all are as high
+    # Where the dots are, and the end of the names, in rows.
+    middle, spread = (0.5 * tall / (ROW + tall), SPREAD * ROW / (ROW + tall)) if narrow else (0.0, SPREAD)
+    for axes in stacked(path, [title], [height], LINE * (_lines(axis) + sum(map(_lines, labels))), axis):
+        for place, row in enumerate(rows):
+            offsets = np.linspace(-spread, spread, max(2, len(row.values)))[: len(row.values)]
+            size, mean, at = DOT if len(row.values) > FEW else 2 * DOT, row.estimate.mean, place + middle
+            axes.scatter(row.values, at + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
+            bar = {"fmt": "none", "ecolor": "black", "elinewidth": 1.3, "capsize": 3, "zorder": 4}
+            axes.errorbar(mean, at, xerr=row.estimate.reach, **bar)
+            axes.plot(mean, at, **row.look.marks(7), markeredgewidth=1, zorder=5)
+            end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}
+            number = score.estimate(row.estimate, signed=True)
+            if narrow:
+                white = {"facecolor": "white", "edgecolor": "none", "pad": 0}
+                above = end | {"xytext": (0, 2), "va": "bottom", "bbox": white}
+                note(axes, names[place], (0, at - spread), **above)
+                note(axes, number, (1, at - spread), **above, ha="right")
+            else:
+                note(axes, number, (1, place), **end)
+        axes.set_yticks(
+            range(len(rows)), [""] * len(rows) if narrow else names, parse_math=False, fontsize=medium().note
+        )
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.tick_params(axis="y", length=0)
+        axes.spines["left"].set_visible(False)
+        grid(axes, "x")
         axes.axvline(0, color="black", linewidth=1, zorder=1, label=labels[0])
         for value, label in zip(lines.values(), labels[1:], strict=True):
             axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
         axes.set_xlabel(axis, parse_math=False)
+        figure = axes.get_figure(root=True)
+        assert figure is not None
         legend_below(figure, *axes.get_legend_handles_labels())
-        save(figure, path)
 
 
-def _rows(results: Results, condition: str) -> Iterator[Row]:
-    """A row for every method but the baseline; how many targets have no difference stands in its name."""
-    looked = looks(results.names)
-    for test in results.against_baseline if results.layout.baseline else ():
-        if test.condition != condition or not test.estimate.n:
-            continue
-        name = results.layout.marked(test.second)
-        if test.estimate.n < len(results.targets):
-            name = f"{name}, {test.estimate.n} of {len(results.targets)} targets"
-        yield Row(name, test.differences, test.estimate, looked[test.second])
-
-
-def _dots(axes: Axes, rows: Sequence[Row], names: Sequence[str], score: Score) -> None:
-    """Draw rows from above to below, with their names to the left and their numbers to the right of the axes."""
-    for height, row in enumerate(rows):
-        offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
-        size = DOT if len(row.values) > FEW else 2 * DOT
-        axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
-        mean = row.estimate.mean
-        axes.errorbar(
-            mean, height, xerr=row.estimate.reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4
-        )
-        axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
-        end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}
-        note(axes, score.estimate(row.estimate, signed=True), (1, height), **end)
-    axes.set_yticks(range(len(rows)), names, parse_math=False, fontsize=medium().note)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
-    grid(axes, "x")
+def _lines(words: str) -> int:
+    return words.count("\n") + 1

@@ -12,8 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..data.ranks import Ranks
 from ..data.text import bracketed
-from .look.medium import medium
-from .style import GREY, PALE, grid, new_figure, save, style
+from .look import GREY, PALE, chart, grid, medium
 
 ROW, FRAME, AGREEMENT = 34, 125, 240  # pixels: of a method, around all, and of what stands below
 NAMES = 0.27  # of the width, for the names of the methods
@@ -24,20 +23,14 @@ DARK = 0.55  # share from which on figures in a cell are white
 
 def draw_ranks(path: Path, ranks: Ranks) -> None:
     """Draw the places of the methods and the agreement of the draws side by side."""
-    with style():
-        height = FRAME + ROW * max(4, len(ranks.methods))
-        figure = new_figure(medium().width, round(medium().scale * (height + AGREEMENT * medium().narrow)))
+    narrow, height = medium().narrow, FRAME + ROW * max(4, len(ranks.methods))
+    shape = {"rows": 2, "height_ratios": [height, AGREEMENT]} if narrow else {"columns": 2, "width_ratios": [5, 3]}
+    with chart(path, height + AGREEMENT * narrow, **shape) as (figure, panels):
         figure.set_layout_engine("constrained", w_pad=0.08)
-        if medium().narrow:
-            left, right = figure.subplots(2, 1, height_ratios=[height, AGREEMENT])
-        else:
-            left, right = figure.subplots(1, 2, width_ratios=[5, 3])
-        figure.suptitle(
-            ranks.swept.before, x=0.01, ha="left", weight="bold", fontsize=medium().text + 1, parse_math=False
-        )
-        _shares(left, ranks)
-        _agreement(right, ranks)
-        save(figure, path)
+        title = {"x": 0.01, "ha": "left", "weight": "bold", "fontsize": medium().text + 1, "parse_math": False}
+        figure.suptitle(ranks.swept.before, **title)
+        _shares(panels.flat[0], ranks)
+        _agreement(panels.flat[1], ranks)
 
 
 def _shares(axes: Axes, ranks: Ranks) -> None:

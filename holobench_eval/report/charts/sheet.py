@@ -34,7 +34,7 @@ from ...metrics import match, score
 from ...optics import srgb_encode
 from ...optics.convolution import iris
 from ...study.opening import open_bench
-from .style import METADATA
+from .look import METADATA
 
 VERSION = 6  # of the drawing: sheets of another are drawn again
 DPI = 75  # of a PNG: 1275 x 975 pixels, the width of a page of pictures

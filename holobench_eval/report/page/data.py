@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib import colormaps
 
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..data.board import GROUPS, board
 from ..data.columns import costs
 from ..data.phrases import counted, tested, verdict

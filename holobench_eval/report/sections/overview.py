@@ -13,7 +13,7 @@ from ..charts import paired
 from ..charts.curves import draw_costs
 from ..charts.error_budget import draw_budgets
 from ..charts.family import draw_map
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..charts.tiles import draw_rows
 from ..data import over_displays
 from ..data.board import board

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
+from ..charts.look import slugs
 from ..charts.ranks import draw_ranks
-from ..charts.style import slugs
 from ..data.ranks import CIRCULAR, Pair, Ranks
 from ..data.statistics import CLEAR, mean_interval
 from ..data.text import percent, words

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..charts.curves import draw_sweep
-from ..charts.style import slugs
+from ..charts.look import slugs
 from ..charts.tiles import draw_rows, spread
 from ..data.layout import OFFLINE, ONLINE
 from ..data.sweeps import Sweep

@@ -12,9 +12,8 @@ from skimage.io import imread
 
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.charts import curves, paired, sheet, tiles
-from holobench_eval.report.charts.look.methods import REGISTRY, looks
+from holobench_eval.report.charts.look import LARGEST, REGISTRY, looks, save, save_picture, slugs
 from holobench_eval.report.charts.sheet import draw_sheet, drawn_from, save_sheet
-from holobench_eval.report.charts.style import LARGEST, save, save_picture, slugs
 from holobench_eval.report.data.board import board
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic

@@ -13,7 +13,7 @@ from holobench_eval.report import Results
 from holobench_eval.report.answers import kind_of, over_displays
 from holobench_eval.report.build import related
 from holobench_eval.report.charts.family import draw_map
-from holobench_eval.report.charts.look.methods import looks
+from holobench_eval.report.charts.look import looks
 from holobench_eval.report.charts.paired import draw_over_displays
 from holobench_eval.report.data.board import board
 from holobench_eval.report.data.over_displays import (
