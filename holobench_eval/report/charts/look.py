@@ -41,51 +41,25 @@ NEUTRAL = "#888888"  # of methods that are not in the registry
 PALEST = 0.85  # share of white in the face of a method's last variant
 MARKERS = "osD^v<>PXp*"
 
-REGISTRY = {
-    "wirtinger": (NAVY, "o"),
-    "wirtinger_gamma": (NAVY, "s"),
-    "wirtinger_veil": (NAVY, "P"),
-    "double_phase": (AMBER, "^"),
-    "double_phase_aa": (AMBER, "v"),
-    "double_phase_bl": (AMBER, "<"),
-    "double_phase_gamma": (AMBER, ">"),
-    "gerchberg_saxton": (CRIMSON, "s"),
-    "hio": (CRIMSON, "D"),
-    "multi_plane": (CRIMSON, "p"),
-    "sgd": (SKY, "D"),
-    "odak_sgd": (SKY, "o"),
-    "torchoptics_adam": (SKY, "s"),
-    "nearest_level": (NAVY, "^"),
-    "straight_through": (SKY, "P"),
-    "gumbel": (SKY, "*"),
-    "random_frames": (SKY, "p"),
-    "light_field": (SKY, "X"),
-    "focal_stack": (SKY, "h"),
-    "partially_coherent": (SKY, "v"),
-    "hil": (MAGENTA, "P"),
-    "hil_tuned": (MAGENTA, "X"),
-    "hil_nh3d": (MAGENTA, "p"),
-    "hil_plus": (ORANGE, "*"),
-    "hil_terms": (MAGENTA, "*"),
-    "parametric_model": (GREEN, "s"),
-    "partially_coherent_model": (GREEN, "P"),
-    "hybrid_model": (GREEN, "D"),
-    "twin": (GREEN, "*"),
-    "learned_kernel": (GREEN, "^"),
-    "cnn_prop_cnn": (GREEN, "v"),
-    "image_terms": (GREEN, "<"),
-    "image_network": (GREEN, ">"),
-    "field_network": (GREEN, "o"),
-    "holonet": (ORANGE, "o"),
-    "ccnn": (ORANGE, "s"),
-    "tensor_holography": (ORANGE, "D"),
-    "unet_phase": (ORANGE, "^"),
-    "online_camera": (VIOLET, "D"),
-    "online_camera_network": (VIOLET, "s"),
-    "phases": (SKY, "^"),
-    "oracle": (BLACK, "D"),
-    "through": (NAVY, "D"),
+FAMILIES = {  # method:marker of each hue
+    NAVY: "wirtinger:o wirtinger_gamma:s wirtinger_veil:P nearest_level:^ through:D",
+    ORANGE: "hil_plus:* holonet:o ccnn:s tensor_holography:D unet_phase:^",
+    GREEN: (
+        "parametric_model:s partially_coherent_model:P hybrid_model:D twin:* learned_kernel:^ cnn_prop_cnn:v "
+        "image_terms:< image_network:> field_network:o"
+    ),
+    MAGENTA: "hil:P hil_tuned:X hil_nh3d:p hil_terms:*",
+    AMBER: "double_phase:^ double_phase_aa:v double_phase_bl:< double_phase_gamma:>",
+    SKY: (
+        "sgd:D odak_sgd:o torchoptics_adam:s straight_through:P gumbel:* random_frames:p light_field:X "
+        "focal_stack:h partially_coherent:v phases:^"
+    ),
+    VIOLET: "online_camera:D online_camera_network:s",
+    CRIMSON: "gerchberg_saxton:s hio:D multi_plane:p",
+    BLACK: "oracle:D",
 }
+MEMBERS = {hue: dict(each.split(":") for each in members.split()) for hue, members in FAMILIES.items()}
+REGISTRY = {name: (hue, marker) for hue, members in MEMBERS.items() for name, marker in members.items()}
 
 
 @dataclass(frozen=True)
