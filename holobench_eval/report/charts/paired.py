@@ -14,6 +14,7 @@ from ..data.statistics import Array, Estimate
 from .look import GREY, Look, grid, legend_below, looks, medium, note, slugs, stacked
 
 ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
+BAND = 22  # pixels: of a method's dots where its name stands above them
 SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
 DOT, FEW = 9, 12  # size of a target's dot [square points], twice that for so few targets
 NAMES, ABOVE = 0.28, 0.55  # of the width, for the names of the methods: beside the rows, and above narrow ones
@@ -92,14 +93,15 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
     names = [
         row.name if medium().height else medium().wrap(row.name, (ABOVE if narrow else NAMES) * width) for row in rows
     ]
-    tall = LINE * max(_lines(name) for name in names)
-    height = FRAME + len(rows) * (ROW + tall if narrow else max(ROW, tall))  # all are as high
-    # Where the dots are, and the end of the names, in rows.
-    middle, spread = (0.5 * tall / (ROW + tall), SPREAD * ROW / (ROW + tall)) if narrow else (0.0, SPREAD)
-    for axes in stacked(path, [title], [height], LINE * (_lines(axis) + sum(map(_lines, labels))), axis):
-        for place, row in enumerate(rows):
-            offsets = np.linspace(-spread, spread, max(2, len(row.values)))[: len(row.values)]
-            size, mean, at = DOT if len(row.values) > FEW else 2 * DOT, row.estimate.mean, place + middle
+    tall = [LINE * _lines(name) for name in names]
+    unit = BAND if narrow else max(ROW, *tall)
+    heights = [unit + each * narrow for each in tall]
+    ends = np.cumsum(heights) / unit - 0.5
+    footer = LINE * (_lines(axis) + sum(map(_lines, labels)))
+    for axes in stacked(path, [title], [FRAME + sum(heights)], footer, axis):
+        for row, name, at in zip(rows, names, ends - 0.5, strict=True):
+            offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
+            size, mean = DOT if len(row.values) > FEW else 2 * DOT, row.estimate.mean
             axes.scatter(row.values, at + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
             bar = {"fmt": "none", "ecolor": "black", "elinewidth": 1.3, "capsize": 3, "zorder": 4}
             axes.errorbar(mean, at, xerr=row.estimate.reach, **bar)
@@ -109,14 +111,13 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
             if narrow:
                 white = {"facecolor": "white", "edgecolor": "none", "pad": 0}
                 above = end | {"xytext": (0, 2), "va": "bottom", "bbox": white}
-                note(axes, names[place], (0, at - spread), **above)
-                note(axes, number, (1, at - spread), **above, ha="right")
+                note(axes, name, (0, at - SPREAD), **above)
+                note(axes, number, (1, at - SPREAD), **above, ha="right")
             else:
-                note(axes, number, (1, place), **end)
-        axes.set_yticks(
-            range(len(rows)), [""] * len(rows) if narrow else names, parse_math=False, fontsize=medium().note
-        )
-        axes.set_ylim(len(rows) - 0.5, -0.5)
+                note(axes, number, (1, at), **end)
+        beside = [""] * len(rows) if narrow else names
+        axes.set_yticks(ends - 0.5, beside, parse_math=False, fontsize=medium().note)
+        axes.set_ylim(ends[-1], -0.5)
         axes.tick_params(axis="y", length=0)
         axes.spines["left"].set_visible(False)
         grid(axes, "x")
