@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,7 @@ def _draw(results: Results, path: Path, title: str, rows: Sequence[Row], lines: 
             offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
             size, mean = DOT if len(row.values) > FEW else 2 * DOT, row.estimate.mean
             axes.scatter(row.values, at + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
-            bar = {"fmt": "none", "ecolor": "black", "elinewidth": 1.3, "capsize": 3, "zorder": 4}
+            bar: dict[str, Any] = {"fmt": "none", "ecolor": "black", "elinewidth": 1.3, "capsize": 3, "zorder": 4}
             axes.errorbar(mean, at, xerr=row.estimate.reach, **bar)
             axes.plot(mean, at, **row.look.marks(7), markeredgewidth=1, zorder=5)
             end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +25,9 @@ DARK = 0.55  # share from which on figures in a cell are white
 def draw_ranks(path: Path, ranks: Ranks) -> None:
     """Draw the places of the methods and the agreement of the draws side by side."""
     narrow, height = medium().narrow, FRAME + ROW * max(4, len(ranks.methods))
-    shape = {"rows": 2, "height_ratios": [height, AGREEMENT]} if narrow else {"columns": 2, "width_ratios": [5, 3]}
+    shape: dict[str, Any] = {"columns": 2, "width_ratios": [5, 3]}
+    if narrow:
+        shape = {"rows": 2, "height_ratios": [height, AGREEMENT]}
     with chart(path, height + AGREEMENT * narrow, **shape) as (figure, panels):
         figure.set_layout_engine("constrained", w_pad=0.08)
         title = {"x": 0.01, "ha": "left", "weight": "bold", "fontsize": medium().text + 1, "parse_math": False}

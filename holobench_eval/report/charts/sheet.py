@@ -6,6 +6,7 @@ import io
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -118,7 +119,8 @@ class _Sheet:
         self.workbench, self.axes, self.bench, self.spec = workbench, axes, workbench.bench, workbench.spec
         self.profile, self.index = self.bench.profile, len(self.bench.channels) // 2
         self.light, self.geometry = self.bench.channels[self.index].light, self.bench.channels[self.index].geometry
-        self.named, self.colours = ", green", COLOURS
+        self.named = ", green"
+        self.colours: tuple[str, ...] = COLOURS
         if len(self.spec.wavelengths) == 1:  # in the colour that it is nearest to
             nearest = sum(self.spec.wavelengths[0] < bound for bound in BOUNDS)
             self.named, self.colours = "", COLOURS[nearest : nearest + 1]
@@ -259,14 +261,16 @@ class _Sheet:
 
         phase: ``(H, W)`` [rad]. The picture is centred, so that a blaze moves the zero order to its negative.
         """
-        panel, spec, edge = self.profile.panel, self.spec, {"fill": False, "edgecolor": "tab:orange"}
+        panel, spec = self.profile.panel, self.spec
+        edge: dict[str, Any] = {"fill": False, "edgecolor": "tab:orange"}
         with torch.no_grad():
             field = self.light.in_torch(phase, 1.0).mean((0, 1))
         power = torch.fft.fftshift(torch.fft.fft2(field)).abs() ** 2
         decibels = 10 * torch.log10((power / power.max()).clamp(min=1e-5))
         share = float(self.light.unmodulated.mean().abs() ** 2)
         up, across = (-cycles for cycles in panel.blaze)
-        is_open = float(iris(*(torch.tensor(f / spec.pitch) for f in (up, across)), spec.pitch, panel.pupil)) > 0.5
+        fy, fx = (torch.tensor(cycles / spec.pitch) for cycles in (up, across))
+        is_open = float(iris(fy, fx, spec.pitch, panel.pupil)) > 0.5
         title = f"zero order + dead area: {100 * share:.0f} %, {'pass' if is_open else 'stopped by'} the iris"
         if spec.plane == "fourier":
             title = f"Fourier plane, zero order + dead area: {100 * share:.0f} %"

@@ -206,7 +206,7 @@ def draw_wall(
     """Draw a slide of captures, a row a target: its picture, then a capture a method; ``below`` all stands below."""
     columns = 1 + max(len(tiles) for _, tiles in rows.values())
     with chart(path, 0, len(rows), columns) as (figure, panels):
-        figure.set_layout_engine("compressed")
+        figure.set_layout_engine("constrained", h_pad=0.12)  # a row's scores need room above the next row
         figure.suptitle(medium().wrap(title, 0.76 * medium().width), weight="bold", fontsize=1.25 * medium().text)
         figure.supxlabel(below, fontsize=medium().note, parse_math=False)
         letters = medium().characters(medium().width / columns)
