@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib import colormaps
 
 from ..board import GROUPS, board
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..columns import costs
 from ..phrases import counted, verdict
 from ..results import Results, to_json

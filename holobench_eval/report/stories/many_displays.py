@@ -21,7 +21,7 @@ from ...study.calibration.family import load_family, names
 from ..board import Board
 from ..charts import paired
 from ..charts.family import draw_map
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..markdown import Markdown, table_of
 from ..results import Results
 from ..statistics import FEWEST_DISPLAYS, Array, Estimate, cause, two_way

@@ -15,8 +15,8 @@ from scipy import stats
 
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..board import Board
+from ..charts.look import slugs
 from ..charts.ranks import draw_ranks
-from ..charts.style import slugs
 from ..facts import OFFLINE, Swept
 from ..markdown import Markdown, bullets, heading, table_of
 from ..results import Results

@@ -14,7 +14,7 @@ import pandas as pd
 from ...display.simulated.changes import KINDS
 from ..board import Board, is_gray
 from ..charts.curves import draw_sweep
-from ..charts.style import slugs
+from ..charts.look import slugs
 from ..charts.tiles import draw_rows, spread
 from ..facts import OFFLINE, ONLINE, Swept
 from ..markdown import Markdown, table_of

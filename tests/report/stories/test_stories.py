@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[3]
 FILE = '''
 """How bright the captures are, which no other story asks."""
 
-from holobench_eval.report.charts.style import new_figure, save
+from holobench_eval.report.charts.look import new_figure, save
 from holobench_eval.report.markdown import bullets, heading
 from holobench_eval.report.story import Part
 
