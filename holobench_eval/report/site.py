@@ -140,8 +140,9 @@ def _best(group: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _row(row: Mapping[str, Any], score: Score) -> dict[str, str]:
-    ends = [None if row["difference"] is None else row["difference"][end] for end in ("mean", "low", "high")]
-    change = Estimate(*(math.nan if end is None else float(end) for end in ends), 0, 0)
+    ends = [(row["difference"] or {}).get(end) for end in ("mean", "low", "high")]
+    mean, low, high = (math.nan if end is None else float(end) for end in ends)
+    change = Estimate(mean, low, high, 0, 0)
     unclear = "°" if row["verdict"] == "not shown to differ" else ""
     return {
         "method": str(row["method"]),
