@@ -242,7 +242,7 @@ class Study:
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same
     displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them;
-    board: whether the study enters the pages of displays on a site.
+    board: whether its cards come first on a site.
     file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 
