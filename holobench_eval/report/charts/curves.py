@@ -110,7 +110,8 @@ def _draw_costs(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looke
 
 def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
     """Means, slightly apart from each other, with bars for their differences to the unchanged display."""
-    kind, curves = KINDS[points["kind"].iloc[0]], dict(iter(points.groupby("method", sort=False)))
+    kind = KINDS[points["kind"].iloc[0]]
+    curves = {str(label): curve for label, curve in points.groupby("method", sort=False)}
     places = points.drop_duplicates("text")
     looked, better = looks(results.names), results.headline.sign
     positions = places["value"].to_numpy(np.float64) if kind.numeric else np.arange(len(places))
@@ -118,7 +119,7 @@ def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
     for index, (label, curve) in enumerate(curves.items()):
         axes.errorbar(
             positions + (index - (len(curves) - 1) / 2) * apart,
-            [results.values(label, name).mean() for name in curve["condition"]],
+            [results.values(label, str(name)).mean() for name in curve["condition"]],
             yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in curve["loss"]]),
             color=looked[label].colour,
             **marks(looked[label], 6.5),

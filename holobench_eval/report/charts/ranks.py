@@ -55,7 +55,7 @@ def _shares(axes: Axes, ranks: pd.DataFrame) -> None:
         axes.add_patch(
             Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
-    names = [medium().wrap(label, NAMES * medium().width) for label in ranks]
+    names = [medium().wrap(str(label), NAMES * medium().width) for label in ranks]
     axes.set_yticks(range(count), names, parse_math=False, fontsize=medium().note)
     axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from ..data.board import Board
 from ..data.phrases import difference, marked, tested, value, verdict
@@ -21,7 +21,7 @@ LIMITS = (
 
 # By measure: what a hologram is made of that knows of all and that knows of one; the title of the details; what their
 # columns are, and in which unit; and what must be known of these.
-WORDS = {
+WORDS: Mapping[str, tuple[tuple[str, str], str, tuple[str, str], str]] = {
     "focus": (
         ("all planes", "one plane"),
         "Plane by plane",
@@ -94,7 +94,7 @@ def table(board: Board) -> Markdown | None:
     return table_of(rows)
 
 
-def _render(report: Report, _: Figures) -> Blocks:
+def _render(report: Report, figures: Figures) -> Blocks:
     _, title, _, explanation = WORDS[report.layout.measure]
     yield heading(title)
     yield f"{report.results.headline.axis}, mean over scenes. {explanation}"

@@ -61,6 +61,11 @@ class Point(NamedTuple):
         """What changes, in words."""
         return KINDS[self.kind].words
 
+    @property
+    def is_before(self) -> bool:
+        """Whether nothing is changed."""
+        return self.condition == self.display
+
 
 def sweeps(results: Results) -> dict[tuple[str, str, str], list[Point]]:
     """The points of every display, kind of change and method that is planned at every value of it."""
@@ -141,13 +146,14 @@ def _costs(results: Results, here: list[list[Point]], label: str) -> Iterator[st
     points = [point for points in here for point in points if point.method == label]
     for worst, loss in _lost(points)[:1]:
         cost = f"{label} loses at most {difference(score, loss)} ({worst.change}, {worst.text})"
-        lead = next(point.lead for point in points if point.condition == point.display)
+        lead = next(point.lead for point in points if point.is_before)
         if lead is None:
             yield cost
         elif lead.mean <= 0:
             yield f"{cost}, with no lead over {baseline} before ({score.with_unit(lead.mean, signed=True)})"
         else:
-            least = min(point.lead.mean for point in points if point.lead)
+            leads = (point.lead.mean for point in points if point.lead and not point.is_before)
+            least = min(leads, default=lead.mean)
             ends = "stays" if least > 0 else "is lost"
             yield f"{cost}; its lead over {baseline} {ends}, {score.with_unit(least, signed=True)} at least"
 
@@ -155,9 +161,8 @@ def _costs(results: Results, here: list[list[Point]], label: str) -> Iterator[st
 def _seen(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
     score, baseline, parts = results.headline, str(results.layout.baseline), []
-    pupils = [point for points in here for point in points if point.kind == "eye_pupil"]
-    leads = ((point.value, (point, point.lead)) for point in pupils if point.lead and point.condition != point.display)
-    for place, rivals in grouped(leads).items():
+    pupils = [point for points in here for point in points if point.kind == "eye_pupil" and not point.is_before]
+    for place, rivals in grouped((point.value, (point, point.lead)) for point in pupils if point.lead).items():
         ranked = sorted(rivals, key=lambda rival: -rival[1].mean)
         above = [rival for rival in ranked if rival[1].low > 0]
         each = [f"{point.method} {difference(score, lead)}" for point, lead in (above or ranked)[:1]]
@@ -182,7 +187,7 @@ def _ranges(results: Results, here: list[list[Point]]) -> Iterator[str]:
 def small_range(points: list[Point]) -> str | None:
     """The numbers around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:
     ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``. None where the next one has no score."""
-    start, ends = [point.condition for point in points].index(points[0].display), list[float]()
+    start, ends = [point.is_before for point in points].index(True), list[float]()
     for unchanged, *others in (points[start::-1], points[start:]):
         end = unchanged.value
         for point in others:
@@ -193,7 +198,7 @@ def small_range(points: list[Point]) -> str | None:
             end = point.value
         ends.append(float(end))
     low, high = ends
-    tested = [float(point.value) for point in points if point.condition != point.display]
+    tested = [float(point.value) for point in points if not point.is_before]
     less, more = " or less" * (low == min(tested)), " or more" * (high == max(tested))
     span = f"{low:g}{less} to {high:g}{more} {KINDS[points[0].kind].unit}".strip()
     return span if low < high else "nowhere"
@@ -226,8 +231,8 @@ def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[E
 def _judged(results: Results, points: list[Point], until: float | None) -> str:
     """Whether a published claim of robustness holds: no mean loss above a decibel."""
     score, far = results.headline, math.inf if until is None else until
-    within = [point for point in points if not (isinstance(point.value, float) and abs(point.value) > far)]
-    within = [point for point in within if point.condition != point.display]
+    changed = [point for point in points if not point.is_before]
+    within = [point for point in changed if not (isinstance(point.value, float) and abs(point.value) > far)]
     if not (lost := _lost(within)) or len(lost) < len(within) or score.unit != "dB":
         return f"cannot be judged for {points[0].method}: some points have no score"
     worst, loss = lost[0]
@@ -284,11 +289,11 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
         yield path, f"Captures of {target} on {display} along a change: {change}."
 
 
-def _applies(report: Report) -> bool:
-    return applies(report.results)
-
-
 PARTS = (
-    Part(45, applies=_applies, figures=_curves),
-    Part(46, applies=_applies, figures=lambda report: report.pictures("sweep-*.jpg", _pictures)),
+    Part(45, applies=lambda report: applies(report.results), figures=_curves),
+    Part(
+        46,
+        applies=lambda report: applies(report.results),
+        figures=lambda report: report.pictures("sweep-*.jpg", _pictures),
+    ),
 )

@@ -72,11 +72,11 @@ def trainings(report: Report) -> list[Training]:
         uses += [(needed[-1], (DISPLAY, layout.learned_display, "")) for _, needed in prepared]
     known, learned = training_records(report.output), list[Training]()
     for identity, users in grouped(uses).items():
-        labels, display, record = tuple(dict.fromkeys(label for label, *_ in users)), users[0][1], known.get(identity)
-        if record:
-            display = str(record.provenance["description"].get("profile", display))
+        labels, display, trained = tuple(dict.fromkeys(label for label, *_ in users)), users[0][1], known.get(identity)
+        if trained:
+            display = str(trained.provenance["description"].get("profile", display))
         digests = frozenset(digest for *_, digest in users if digest)
-        learned.append(Training(words(list(labels)), labels, display, record, digests))
+        learned.append(Training(words(list(labels)), labels, display, trained, digests))
     names = Counter(training.name for training in learned)
     return [replace(each, name=f"{each.name} on {each.display}") if names[each.name] > 1 else each for each in learned]
 
@@ -105,7 +105,7 @@ def _summary(report: Report) -> Iterator[dict[str, object]]:
     learned, given = report.once(trainings), report.layout.training
     for training in learned:
         captures, seconds = (training.fact(name, (int, float), math.nan) for name in ("captures", "seconds"))
-        row = {"method": training.name, "trained on": training.display}
+        row: dict[str, object] = {"method": training.name, "trained on": training.display}
         row |= {"captures": number(captures), "seconds": number(seconds)}
         row |= {"images": given.images - given.held_out if given else "–", "held out": given.held_out if given else "–"}
         row |= {"rounds": len(training.record.rounds) or "–" if training.record else "–"}
@@ -210,8 +210,9 @@ def estimates(training: Training) -> Iterator[dict[str, Any]]:
 
 
 def _number(value: object) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST
-    return float(value) if is_number else math.nan
+    if isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST:
+        return float(value)
+    return math.nan
 
 
 def quantities(rows: Sequence[Mapping[str, Any]]) -> Markdown | None:

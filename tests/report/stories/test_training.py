@@ -100,29 +100,6 @@ def test_captures_for_training_are_told_apart_from_those_while_solving(found):
     assert table.set_index("label").loc["HIL", "learned_sha256"] == "hil" * 16
 
 
-def test_a_study_without_training_has_neither_its_columns_nor_its_section(found, tmp_path):
-    plain = [record for record in found if record["label"] not in ("HIL", "U-Net")]
-    text = written(plain, tmp_path, trained=frozenset(), training=None, pairs=PAIRS[:1])
-    assert "## Training" not in text
-    assert "## Diagnosis" not in text
-    for name in ("records.csv", "table.csv"):
-        assert "training" not in (tmp_path / name).read_text().splitlines()[0]
-
-
-def test_every_round_is_listed_with_its_figures_on_held_out_images(found, tmp_path):
-    keep(tmp_path, "hil", perceptual="oriented filters")
-    keep(tmp_path, "unet")
-    text = written(found, tmp_path, note="Weights *as drawn*.\n\n# No heading | no table")
-    assert "| HIL | leto-aged | 140 | 3600 | 20 | 4 | 2 | oriented filters | hilhilhilh |" in text
-    assert "| HIL | 1 | 16 | 120 | 20.50 | 12.70 | 14.70 |" in text
-    assert "| U-Net | 2 | 24 | 200 | 21.25 | 15.50 | 18.12 |" in text
-    assert "(figures/training-1.png)" in text
-    assert (tmp_path / "figures" / "training-1.png").is_file()
-    assert "24 of dead_leaves (count = 24, seed = 0), of which 4 only watch the training; at most 200 captures" in text
-    note = text.index("Weights \\*as drawn\\*. # No heading \\| no table")
-    assert text.index("\n## Limits\n") < note
-
-
 def test_a_training_that_is_not_beside_the_report_or_not_the_right_one_is_said(found, tmp_path):
     keep(tmp_path, "hil", sha256="another", perceptual="<img src=x onerror=alert(1)> | [l](javascript:1)")
     text, _ = section_of(found, tmp_path)
@@ -189,17 +166,6 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         "none: the network predicts in the frame",
     ):
         assert phrase in text, phrase
-
-
-def test_two_reports_of_one_training_have_equal_bytes(found, tmp_path):
-    reports = []
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        keep(tmp_path / name, "hil", made=name)
-        text, figures = section_of(found, tmp_path / name)
-        reports.append((text, [path.read_bytes() for path in figures]))
-    assert reports[0] == reports[1]
-    assert len(reports[0][1]) == 1
 
 
 def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_limits(found, tmp_path):
