@@ -75,14 +75,15 @@ def margins(results: Results) -> list[Margin]:
     shares, rows = np.eye(len(clusters))[index] / np.bincount(index), list[Margin]()
     for label in layout.methods if where else ():
         if label != layout.baseline and label not in layout.privileged:
-            both = ([results.values(row, name) for name in where] for row in (label, str(layout.baseline)))
-            differences = np.subtract(*both)
+            own, other = ([results.values(row, name) for name in where] for row in (label, str(layout.baseline)))
+            differences = np.subtract(own, other)
             tests = [test for test in results.against_baseline if test.second == label and test.condition in where]
             clear = [sign * test.estimate.mean for test in tests if test.is_shown]
             values, by_cluster = differences.mean(1), differences @ shares
+            low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
             better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
-            rows.append(Margin(label, values, *np.quantile(values, (0.05, 0.5, 0.95)), over_both, better, worse))
+            rows.append(Margin(label, values, low, median, high, over_both, better, worse))
     return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 
 
