@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def table(board: Board) -> Markdown | None:
     """The board of every display, under its name where there are several: a row a method, its group above it."""
     parts = list[object]()
     for display in board.displays:
-        lines = list[dict[str, object]]()
+        lines = list[Mapping[str, object]]()
         for group, rows in display.groups:
             own = [_line(board, display, row, group) for row in rows]
             if len(display.groups) > 1:
@@ -114,7 +114,7 @@ def table(board: Board) -> Markdown | None:
     return blocks([*parts, f"{note} Brackets: 95 % intervals."]) if board.displays else None
 
 
-def _line(board: Board, display: Display, row: Row, group: str) -> dict[str, object]:
+def _line(board: Board, display: Display, row: Row, group: str) -> Mapping[str, object]:
     score, results = board.results.headline, board.results
     title = results.facts.of(row.label, "title")
     name = Markdown("{} ({})").format(title, code(row.label)) if title else row.label

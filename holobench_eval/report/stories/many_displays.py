@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -52,34 +52,44 @@ def shown_on(results: Results) -> list[str]:
     return [name for name in results.conditions if all(results.is_complete(label, name) for label in rows)]
 
 
-def margins(results: Results) -> pd.DataFrame:
-    """Every method but the baseline and oracles, the best first, minus the baseline.
+class Margin(NamedTuple):
+    """A method minus the baseline. values: ``(displays,)`` means over targets, with their 5, 50 and 95 % quantiles;
+    over_both: their mean, with an interval over displays and clusters of targets together; better, worse: displays on
+    which the family of tests shows it."""
 
-    values: ``(displays,)`` means over targets, with their median and their 5 and 95 % quantiles; over_both: their mean,
-    with an interval over displays and clusters of targets together; better, worse: displays on which the family of
-    tests shows it.
-    """
+    label: str
+    values: Array
+    low: float
+    median: float
+    high: float
+    over_both: Estimate
+    better: int
+    worse: int
+
+
+def margins(results: Results) -> list[Margin]:
+    """Every method but the baseline and oracles, the best first."""
     where, sign, baseline = shown_on(results), results.headline.sign, str(results.baseline)
     clusters, index = np.unique(results.clusters, return_inverse=True)
-    shares, rows = np.eye(len(clusters))[index] / np.bincount(index), []
+    shares, rows = np.eye(len(clusters))[index] / np.bincount(index), list[Margin]()
     for label in results.labels if where else ():
         if label != baseline and label not in results.facts.oracles:
-            both = ([results.values(row, name) for name in where] for row in (label, baseline))
-            differences = np.subtract(*both)
+            own, other = ([results.values(row, name) for name in where] for row in (label, baseline))
+            differences = np.subtract(own, other)
             tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
             clear = [sign * test.estimate.mean for test in tests if test.is_shown]
             values, by_cluster = differences.mean(1), differences @ shares
+            low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
             better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
-            rows.append((label, values, *np.quantile(values, (0.05, 0.5, 0.95)), over_both, better, worse))
-    rows.sort(key=lambda row: -sign * row[5].mean)
-    return pd.DataFrame(rows, columns=["label", "margin", "low", "median", "high", "over_both", "better", "worse"])
+            rows.append(Margin(label, values, low, median, high, over_both, better, worse))
+    return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 
 
 def verdicts(results: Results) -> Iterator[str]:
     """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
     judges their models; where no score could be had."""
-    rows, where, score = [*margins(results).itertuples()], shown_on(results), results.headline
+    rows, where, score = margins(results), shown_on(results), results.headline
     if not rows:
         yield "No display has a score of every method for every target."
         return
@@ -87,7 +97,7 @@ def verdicts(results: Results) -> Iterator[str]:
     for row in about:
         margin, text = published(results, row.label, results.conditions[0]), _beats(results, row, len(where))
         if margin is not None:
-            above = int((row.margin >= margin).sum())
+            above = int((row.values >= margin).sum())
             has = f"{above or 'none'} {'has' if above < 2 else 'have'}"
             text += f"; {has} the published {score.with_unit(margin, signed=True)}"
         yield f"{text}."
@@ -98,7 +108,7 @@ def verdicts(results: Results) -> Iterator[str]:
         yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
     known = parameters(results)
     for row in about or rows[:1]:
-        if decides := cause(row.margin, known):
+        if decides := cause(row.values, known):
             share = f"R2 {max(decides.explained, 0.0):.2f} of displays left out"
             clear = f"{decides.parameter} (rank correlation {decides.rho:+.2f}, {share})"
             of = f"the margin of {row.label}"
@@ -111,7 +121,7 @@ def verdicts(results: Results) -> Iterator[str]:
         yield f"Left out, since scores are missing: {words(left)}."
 
 
-def _beats(results: Results, row: Any, count: int) -> str:
+def _beats(results: Results, row: Margin, count: int) -> str:
     score = results.headline
     worse = f" and loses on {row.worse}" if row.worse else ""
     return (
@@ -123,7 +133,7 @@ def _beats(results: Results, row: Any, count: int) -> str:
 
 def gains(results: Results) -> pd.DataFrame:
     """By how much each method is better than the baseline, which is the first; a row for each of ``shown_on``."""
-    rows = {row.label: results.headline.sign * row.margin for row in margins(results).itertuples()}
+    rows = {row.label: results.headline.sign * row.values for row in margins(results)}
     return pd.DataFrame({str(results.baseline): 0.0, **rows}, index=shown_on(results))
 
 
@@ -146,7 +156,7 @@ def _best(results: Results) -> Iterator[str]:
     labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
     if known and labels:
         shares = words([f"{max(known.explained(label), 0):.2f} of {label}" for label in labels])
-        yield f"Its parts ({'; '.join(known.shares)}) predict margins on displays left out: R2 {shares}."
+        yield f"Its parts ({'; '.join(map(str, known.shares))}) predict margins on displays left out: R2 {shares}."
 
 
 @dataclass(frozen=True)
@@ -233,7 +243,7 @@ def judged(results: Results) -> dict[str, tuple[int, int]]:
     for other in itertools.islice(models, 1):
         for score in (*other.control, other.headline):
             agree = []
-            for name, gain in gained.iterrows():
+            for name, gain in zip(shown_on(results), gained.to_dict("records"), strict=True):
                 means = {
                     label: other.values(label, name, score.key).mean()
                     for label in other.methods(name)
@@ -258,7 +268,7 @@ def table(board: Board) -> Markdown | None:
                 f"better on [of {count}]": row.better,
                 "worse on": row.worse,
             }
-            for row in margins(board.results).itertuples()
+            for row in margins(board.results)
         ]
     )
 
@@ -266,8 +276,8 @@ def table(board: Board) -> Markdown | None:
 def _figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Margins, and margins against what an error budget found, of the best methods and those of the question."""
     results, path = report.results, report.figures / "quality-displays.png"
-    known, baseline, looked = [*margins(results).itertuples()], results.baseline, looks(results.names)
-    rows = [paired.Row(row.label, row.margin, row.over_both, looked[row.label]) for row in known]
+    known, baseline, looked = margins(results), results.baseline, looks(results.names)
+    rows = [paired.Row(row.label, row.values, row.over_both, looked[row.label]) for row in known]
     figures = {row.label: published(results, row.label, results.conditions[0]) for row in known}
     lines = {f"published for {label}": value for label, value in figures.items() if value is not None}
     paired.draw_rows(results, path, f"{len(shown_on(results))} displays", rows, lines)

@@ -358,7 +358,7 @@ def _holes(report: Report, _: Figures) -> Blocks:
         yield "None: every planned cell has a score."
     else:
         yield "Cells without a score. They enter no mean, and a method without a score for every target is not ranked."
-        yield table_of(holes.to_dict("records"))
+        yield table(list(holes), holes.to_numpy().tolist())
 
 
 def _environment(report: Report, _: Figures) -> Blocks:

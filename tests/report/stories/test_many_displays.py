@@ -33,9 +33,9 @@ def study(gain=lambda name: 0.0, **changes):
 
 def test_a_margin_is_the_mean_over_targets_and_displays_that_show_it_are_counted():
     results = study(lambda name: 2.0 if name < "leto-2020-08" else 0.0)
-    found = {each.label: each for each in margins(results).itertuples()}
+    found = {each.label: each for each in margins(results)}
     assert (found["new"].better, found["new"].worse) == (7, 0)
-    np.testing.assert_allclose(found["new"].margin, [2.05] * 7 + [0.05] * 3)
+    np.testing.assert_allclose(found["new"].values, [2.05] * 7 + [0.05] * 3)
     assert found["new"].over_both.low < 1.45 < found["new"].over_both.high
     assert found["other"].better == found["other"].worse == 0
 
@@ -53,14 +53,14 @@ def test_a_display_that_lacks_a_score_is_left_out_and_named():
     lost = (results.frame["condition"] == DISPLAYS[3]) & (results.frame["target"] == "t2")
     results.frame.loc[lost, ["state", "psnr_linear"]] = "failed", np.nan
     assert DISPLAYS[3] not in shown_on(results)
-    assert len(margins(results)["margin"][0]) == len(DISPLAYS) - 1
+    assert len(margins(results)[0].values) == len(DISPLAYS) - 1
     assert f"Left out, since scores are missing: {DISPLAYS[3]}." in answer(results)
 
 
 def test_the_parameter_that_decides_is_found_and_chance_predicts_nothing_of_a_display_left_out():
     crosstalk = {name: PROFILES[name].crosstalk.width for name in DISPLAYS}
     results = study(lambda name: 10 * crosstalk[name])
-    found = cause(margins(results)["margin"][0], parameters(results))
+    found = cause(margins(results)[0].values, parameters(results))
     assert found.parameter == "crosstalk"
     assert found.rho > 0.99
     assert found.explained > 0.99
