@@ -17,8 +17,7 @@ from .data.tables import of_study, read_records, records_frame, records_text
 from .description import Description, describe
 from .files import texts, write_files
 from .markdown import DETAILS, REPORT, Markdown, blocks
-from .page import write_page
-from .page.pictures import keep_copies
+from .page import keep_copies, write_page
 from .section import Report
 from .sections import sections
 

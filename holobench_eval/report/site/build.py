@@ -23,7 +23,7 @@ from ..compare.paired import read_run
 from ..data.layout import CALIBRATED, CATEGORIES, FLOOR, ONLINE, OPEN_LOOP, ORACLE, Layout, network_of
 from ..data.results import Results
 from ..data.tables import GUARDED, MOST_BYTES, clusters_in, records_text, score_columns
-from ..page.html import asset
+from ..page import asset
 from .html import page, slug
 from .pages import Study, about, cards, places
 from .pictures import figures

@@ -9,7 +9,7 @@ from ...core.hashing import digest
 from ..data.board import GROUPS
 from ..data.phrases import verdict
 from ..data.text import number
-from ..page.html import templates
+from ..page import templates
 
 # Nothing is loaded but the files of the site; no script, no form, no frame, no address of another place.
 POLICY = "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'"

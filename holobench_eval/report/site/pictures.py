@@ -10,7 +10,7 @@ from PIL import Image, UnidentifiedImageError
 
 from ...core.errors import UserError
 from ..markdown import captions
-from ..page.html import plain
+from ..page import plain
 from .html import slug
 
 ROOM = 1_200_000  # bytes of the figures of a study; the others stay in its folder
