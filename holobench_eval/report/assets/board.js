@@ -65,22 +65,24 @@ function bodyRows(row) {
   const swatch = element("span", { class: oracle ? "swatch hollow" : "swatch", "aria-hidden": "true" });
   swatch.style.setProperty("--colour", colour); // as in the figures
   const lacking = row.scored < data.targets.length ? [`${row.scored} of ${data.targets.length} targets`] : [];
-  const quiet = [...(title === row.method ? [] : [row.method]), ...row.marks, ...lacking].join(", ");
+  const quiet = (kind, text) => element("span", { class: `quiet ${kind}` }, text && ` ${text}`);
   const attributes = { type: "button", "aria-expanded": open, "data-key": `open ${row.method}`, click: () => update({ open: open ? "" : row.method }) };
   const arrow = element("span", { class: "arrow", "aria-hidden": "true" }, open ? "▾" : "▸");
-  const name = element("button", attributes, arrow, swatch, element("span", {}, title, element("span", { class: "quiet" }, quiet && ` ${quiet}`)));
+  const names = element("span", {}, title, quiet("code", title === row.method ? "" : row.method), quiet("marks", [...row.marks, ...lacking].join(", ")));
+  const name = element("button", attributes, arrow, swatch, names);
   const cells = columns().map((column) => element("td", {}, ...shownCell(column, row)));
   const line = element("tr", { class: row.verdict, "data-method": row.method }, element("th", { scope: "row" }, name), ...cells);
   return open ? [line, element("tr", { class: "opened" }, element("td", { colspan: cells.length + 1 }, targetTable(row)))] : [line];
 }
 
 /** A letter as a badge; photographs in words; of the headline and a difference the interval, of this a drawing, too. */
-function shownCell({ key, low, high, digits, signed, first }, { tier, cells }) {
+function shownCell({ key, low, high, digits, signed }, { method, tier, cells }) {
   if (key === "tier") return tier ? [element("span", { class: tier === "A" ? "tier first" : "tier" }, tier)] : ["–"];
   if (key === "photographs" && cells.photographs) {
     return [[cells.once && `${number(cells.once)} once`, cells.each && `${number(cells.each)} a picture`].filter(Boolean).join(" + ")];
   }
   const value = cells[key] ?? null;
+  if (signed && method === data.baseline) return ["baseline"];
   if (key === "p" && value !== null && value < 0.001) return ["< 0.001"];
   const ends = [cells[low], cells[high]];
   if (!(signed || key === data.headline.column) || value === null || ends[0] == null) return [number(value, digits, signed)];

@@ -91,5 +91,5 @@ watch(CONTROLS, () => CONTROLS.forEach((key) => (byId(key).value = state[key])))
 watch(["display"], () => {
   const others = [...data.displays, ...data.changed].filter((name) => name !== state.display && !state.display.startsWith(`${name},`));
   for (const line of byId("answer").querySelectorAll("li")) line.hidden = others.some((name) => line.textContent.startsWith(`${name}: `));
-  for (const figure of byId("charts").querySelectorAll("figure")) figure.hidden = others.some((name) => figure.dataset.name.endsWith(`-${name}`));
+  for (const chart of byId("charts").querySelectorAll("[data-name]")) chart.hidden = others.some((name) => chart.dataset.name.endsWith(`-${name}`));
 });

@@ -22,7 +22,9 @@ function wallMethods() {
   const rows = data.rows[state.display].map(({ method }) => method);
   const asked = state.methods.split("\n").filter((method) => rows.includes(method));
   if (asked.length) return asked;
-  const [shown, score] = [shownRows(), ({ cells }) => (data.headline.higher ? -1 : 1) * (cells[data.headline.column] ?? -Infinity)];
+  const names = wallTargets();
+  const shown = shownRows().filter(({ method }) => names.some((target) => pictureOf(method, target) !== null));
+  const score = ({ cells }) => (data.headline.higher ? -1 : 1) * (cells[data.headline.column] ?? -Infinity);
   const best = shown.toSorted((a, b) => score(a) - score(b)).map(({ method }) => method);
   const ofGroups = data.groups.map((group) => best.find((method) => data.methods[method].group === group));
   const named = best.filter((method) => method === data.baseline || data.question?.split(/[\s,?]+/).includes(method));
@@ -37,7 +39,7 @@ async function drawWall() {
   byId("viewer-title").textContent = `Pictures: ${state.display}`;
   byId("pictures").hidden = !targets.length;
   const option = (value, text) => element("option", { value }, text);
-  byId("target").replaceChildren(option("", "with all methods"), ...targets.map((name) => option(name, `${name} (${counts.get(name)} methods)`)));
+  byId("target").replaceChildren(option("", "with most methods"), ...targets.map((name) => option(name, `${name} (${counts.get(name)} methods)`)));
   byId("target").value = targets.includes(state.target) ? state.target : "";
   byId("methods").replaceChildren(byId("methods").firstElementChild, ...data.rows[state.display].map(({ method }) => tick(method, methods)));
   describeErrors();
@@ -89,7 +91,7 @@ async function drawTile(tile) {
   canvas.tile = Object.assign(tile, { pixels, truth });
   byId("wall").style.setProperty("--aspect", pixels.width / pixels.height);
   canvas.setAttribute("aria-label", `${method || sentence(data.words.truth)} ${text}`.trim());
-  caption.replaceChildren(element("b", {}, method || sentence(data.words.truth)), ` ${text}`);
+  caption.replaceChildren(element("b", {}, method || sentence(data.words.truth)), " ", element("span", { class: "score" }, text));
 }
 
 function describeErrors() {
