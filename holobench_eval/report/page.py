@@ -12,6 +12,7 @@ import base64
 import hashlib
 import io
 import json
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from fnmatch import fnmatch
@@ -20,7 +21,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
@@ -29,7 +29,6 @@ from matplotlib import colormaps
 from PIL import Image
 
 from ..core.io import write_atomically
-from ..study.scoring.pictures import LONGEST_THUMBNAIL
 from .charts.look.methods import looks
 from .data.board import GROUPS, board
 from .data.columns import costs
@@ -46,9 +45,9 @@ Cell = tuple[str, str, str]  # method, display, target; a target itself has no m
 MOST_BYTES = 24_000_000  # of the whole page
 OWN = 200_000  # bytes that the template, the policy and the origin may take beside scripts, data, charts and pictures
 CHARTS = ("quality-*", "error-budget*", "sweep-*", "training-*", "stages-*")  # figures of the report that the page has
-NUMBERS = ("quality-*", "error-budget*", "training-*")  # those of lines and text alone, which may change their colours
 SCRIPTS = ("dom", "state", "pixels", "flip", "board", "wall")
 
+ESSENTIAL = ("photographs", "solving_s", "panel_time", "memory_mib")  # columns of costs that stand first
 FIRST = 3  # targets whose pictures come before those of the others
 COPIED_BYTES = 1_200_000  # of all pictures that a report keeps: thirty reports leave a clone below 60 MB
 QUALITY = 75  # of WebP, 0 to 100: two thirds of the bytes of 85, 1 dB further from the capture
@@ -59,58 +58,54 @@ _JSON = str.maketrans({char: f"\\u{ord(char):04x}" for char in "<>&\u2028\u2029"
 
 
 def write_page(report: Report) -> Path:
-    """Write ``report.html`` beside ``report.md`` and return its path; equal records give equal bytes."""
-    path = report.output / "report.html"
-    write_atomically(path, page(report).encode())
-    return path
+    """Write ``report.html`` beside ``report.md`` and return its path; equal records give equal bytes.
 
-
-def page(report: Report) -> str:
-    """The text of the page, at most ``MOST_BYTES`` of UTF-8 where the numbers alone do not take more."""
-    style, data, charts = asset("page.css"), page_data(report), list(_charts(report))
+    It has at most ``MOST_BYTES`` where the numbers and charts alone do not take more.
+    """
+    style, data, charts, known = asset("page.css"), page_data(report), list(_charts(report)), files_of(report)
     scripts = [f'"use strict";\n{asset(f"{name}.js")}' for name in SCRIPTS]
     (title, question), *parts = sections((report.output / REPORT).read_text(encoding="utf-8"), "h1", "h2", "h3")
     origin = sections((report.output / DETAILS).read_text(encoding="utf-8"), "h2")
     taken = [style, *scripts, json_text(data), *(chart["source"] for chart in charts), *(text for _, text in origin)]
-    room = MOST_BYTES - OWN - sum(len(text.encode()) for text in taken)
-    known = files_of(report)
-    held = _fitting(groups(report, known), room, Path.read_bytes, lambda content: -(-len(content) // 3) * 4)
-    data |= {"pictures": _numbers(report.results, held)}
-    answer = dict(parts).get("Answer", Markup())
-    return templates("holobench_eval.report", "assets").get_template("page.html").render(
+    held = pictures(report, known, MOST_BYTES - OWN - sum(len(text.encode()) for text in taken))
+    template = templates("holobench_eval.report", "assets").get_template("page.html")
+    text = template.render(
         title=title,
         question=question,
         policy=policy(scripts, style),
         style=Markup(style),
-        answer=Markup("{}</ul>").format(Markup(answer.partition("</ul>")[0])) if "</ul>" in answer else "",
+        answer=Markup(re.sub(r"(?s)(?<=</ul>).*", "", dict(parts).get("Answer", ""))),
         limits=dict(parts).get("Limits", ""),
         charts=charts,
         origin=origin,
         data=data,
-        note=_note(report, len(held), len(known)),
-        json=Markup(json_text(data)),
+        held=len(held),
+        there=len(known),
+        json=Markup(json_text(data | {"pictures": _numbers(report.results, held)})),
         scripts=map(Markup, scripts),
         contents=(base64.b64encode(content).decode() for content in held.values()),
     )
+    write_atomically(report.output / "report.html", text.encode())
+    return report.output / "report.html"
 
 
 def page_data(report: Report) -> Json:
     """All numbers that the page draws, ready for JSON: no NaN, and rounded as in table.csv."""
     results, drawn = report.results, board(report.results).as_json()
-    rows = {(shown["name"], row["method"]): row for shown in drawn["displays"] for part in shown["groups"] for row in part["rows"]}
-    columns = list(_columns(results, [key for row in rows.values() for key in row["beside"]]))
-    colours = looks(results.names)
-    listed = {name: results.methods(name) for name in [*results.conditions, *results.changed]}
-    category = dict(zip(results.table["label"], results.table["category"], strict=True))
+    groups = [(part["name"], group) for part in drawn["displays"] for group in part["groups"]]
+    rows = {(name, row["method"]): row for name, group in groups for row in group["rows"]}
+    beside = dict.fromkeys(key for row in rows.values() for key in row["beside"])
     titles = {method: row["title"] for (_, method), row in rows.items()}
+    columns = _columns(results, list(map(parse, beside)))
+    category = dict(zip(results.table["label"], results.table["category"], strict=True))
     return {
         "question": drawn["question"],
-        "headline": drawn["headline"] | {"digits": columns[1]["digits"], "column": columns[1]["key"]},
+        "headline": drawn["headline"] | columns[1],
         "baseline": drawn["baseline"],
         "words": {"scored": results.layout.text.scored, "truth": results.layout.text.truth},
         "displays": results.conditions,
         "changed": results.changed,
-        "floors": {shown["name"]: shown["floor"] for shown in drawn["displays"]},
+        "floors": {part["name"]: part["floor"] for part in drawn["displays"]},
         "columns": columns,
         "targets": results.targets,
         "groups": list(GROUPS.values()),
@@ -120,68 +115,59 @@ def page_data(report: Report) -> Json:
                 "registered": results.names[label],
                 "group": GROUPS[category[label]],
                 "oracle": category[label] == ORACLE,
-                "colour": colours[label].colour,  # the same as in the figures
+                "colour": look.colour,  # the same as in the figures
             }
-            for label in dict.fromkeys(label for labels in listed.values() for label in labels)
+            for label, look in looks(results.names).items()
+            if category.get(label) in GROUPS
         },
         "rows": {
-            name: [_row(results, label, name, rows.get((name, label), {}), columns) for label in labels]
-            for name, labels in listed.items()
-        },
-        "values": {
-            name: {label: [to_json(value) for value in results.values(label, name)] for label in labels}
-            for name, labels in listed.items()
+            name: [_row(results, label, name, rows.get((name, label), {})) for label in results.methods(name)]
+            for name in [*results.conditions, *results.changed]
         },
         "magma": colormaps["magma"](range(256), bytes=True)[:, :3].tolist(),
     }
 
 
-def _columns(results: Results, beside: list[str]) -> Iterator[Json]:
+def _columns(results: Results, beside: list[Score]) -> list[Json]:
     """The columns of the board, those first that are seen before the reader asks for all.
 
-    beside: keys of the scores that stand beside the headline.
+    beside: the scores that stand beside the headline.
     """
-    def of(score: Score, first: bool) -> Json:
+
+    def of(score: Score, **more: Any) -> Json:
         ends = {"key": score.column, "low": score.statistic("_lo"), "high": score.statistic("_hi")}
         digits = len(score.number(0.0).partition(".")[2])
-        return {**ends, "heading": score.heading, "digits": digits, "higher": score.higher_is_better, "first": first}
+        return ends | {"heading": score.heading, "digits": digits, "higher": score.higher_is_better} | more
 
-    headline, figures = results.headline, costs(results.table, results.layout.text.each)
-    near = [score for score in map(parse, dict.fromkeys(beside))]
-    yield {"key": "tier", "heading": "letter", "first": True}
-    yield of(headline, True)
-    if results.layout.baseline is not None:
-        heading = f"difference to {results.layout.baseline}{headline.brackets}"
-        yield of(headline, True) | {"key": "difference", "low": "lowest", "high": "highest", "heading": heading, "signed": True}
-    yield from (of(score, True) for score in near)
-    essential = ("photographs", "solving_s", "panel_time", "memory_mib")
-    figures = {"photographs": "photographs", **figures}
-    yield from ({"key": key, "heading": figures[key], "first": True} for key in essential if key in figures)
-    yield {"key": "p", "heading": "adjusted p", "digits": 3}
-    yield from (of(score, False) for score in results.leading if score not in (headline, *near))
-    yield from ({"key": key, "heading": text} for key, text in figures.items() if key not in essential)
+    headline, costly = results.headline, costs(results.table, results.layout.text.each)
+    gain = {"key": "difference", "low": "lowest", "high": "highest", "signed": True}
+    gain["heading"] = f"difference to {results.layout.baseline}{headline.brackets}"
+    costly = {"photographs": "photographs", **costly}
+    return [
+        {"key": "tier", "heading": "letter", "first": True},
+        of(headline, first=True),
+        of(headline, first=True, **gain),
+        *(of(score, first=True) for score in beside),
+        *({"key": key, "heading": costly[key], "first": True} for key in ESSENTIAL if key in costly),
+        {"key": "p", "heading": "adjusted p", "digits": 3},
+        *(of(score) for score in results.leading if score not in (headline, *beside)),
+        *({"key": key, "heading": heading} for key, heading in costly.items() if key not in ESSENTIAL),
+    ]
 
 
-def _row(results: Results, label: str, name: str, drawn: Json, columns: list[Json]) -> Json:
-    """A row: its values by column. drawn: the row of board.json, empty for a change of a display."""
-    row, gain = results.row(label, name), drawn.get("difference")
-    if not drawn and results.layout.baseline not in (None, label):
-        other = results.estimate(results.values(label, name) - results.values(str(results.layout.baseline), name))
-        gain = {"mean": to_json(other.mean), "low": to_json(other.low), "high": to_json(other.high)}
-    wanted = [column[key] for column in columns for key in ("key", "low", "high") if key in column]
-    cells = {key: to_json(row[key]) for key in wanted if key in row}
-    if gain:
-        cells |= {"difference": gain["mean"], "lowest": gain["low"], "highest": gain["high"], "p": gain.get("p")}
-    once, each = row.get("training_captures", 0.0), row.get("captures", np.nan)
-    cells |= {"once": to_json(once), "each": to_json(each), "photographs": to_json(np.nan_to_num(once) + each)}
-    return {
-        "method": label,
-        "tier": drawn.get("tier", ""),
-        "marks": drawn.get("marks", []),
-        "scored": int(row["n"]),
-        "verdict": drawn.get("verdict"),
-        "cells": cells,
-    }
+def _row(results: Results, label: str, name: str, drawn: Json) -> Json:
+    """A row: numbers of table.csv, the difference, the headline of each target.
+
+    drawn: the row of board.json, empty for a changed display.
+    """
+    cells, gain = results.row(label, name).to_dict(), results.gain(label, name)
+    if gain and label != results.layout.baseline:
+        cells |= {"difference": gain.mean, "lowest": gain.low, "highest": gain.high}
+        cells["p"] = (drawn.get("difference") or {}).get("p", math.nan)
+    known = {key: drawn[key] for key in ("tier", "marks", "verdict") if key in drawn}
+    numbers = {key: to_json(value) for key, value in cells.items() if isinstance(value, (int, float))}
+    values = list(map(to_json, results.values(label, name)))
+    return {"method": label, "tier": "", "marks": [], "verdict": None, **known, "cells": numbers, "values": values}
 
 
 def sections(text: str, *tags: str) -> list[tuple[str, Markup]]:
@@ -209,8 +195,7 @@ def _charts(report: Report) -> Iterator[Json]:
         if any(fnmatch(name, f"{pattern}.*") for pattern in CHARTS) and path.is_file():
             kind = "jpeg" if path.suffix == ".jpg" else "png"
             source = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
-            numbers = any(fnmatch(name, pattern) for pattern in NUMBERS)
-            yield {"name": path.stem, "source": source, "caption": plain(caption), "numbers": numbers}
+            yield {"name": path.stem, "source": source, "caption": plain(caption)}
 
 
 def templates(package: str, folder: str) -> Environment:
@@ -246,28 +231,34 @@ def plain(markdown: str) -> str:
 
 def files_of(report: Report) -> dict[Cell, Path]:
     """The files of targets and captures that are there: of a capture that of the first repeat with a score."""
-    results, thumbnails = report.results, report.thumbnails
-    names = [name for name in [*results.conditions, *results.changed] if results.has_pictures(name)]
-    shown = results.done[results.done["condition"].isin(names)].drop_duplicates(["label", "condition", "target"])
+    results, thumbnails, names = report.results, report.thumbnails, _pictured(report.results)
+    done = results.done[results.done["condition"].isin(names)].drop_duplicates(["label", "condition", "target"])
     paths = {
         ("", name, target): thumbnails.of_target(target, results.shape(name))
         for name in dict.fromkeys(map(results.reference, names))
         for target in results.targets
     }
-    for cell in shown.itertuples():
-        paths[cell.label, cell.condition, cell.target] = thumbnails.of_capture(cell.cell)
+    paths |= {(row.label, row.condition, row.target): thumbnails.of_capture(row.cell) for row in done.itertuples()}
     return {cell: path for cell, path in paths.items() if path.is_file()}
 
 
-def groups(report: Report, known: Mapping[Cell, Path]) -> Iterator[dict[Cell, Path]]:
-    """The pictures, those first that answer most; those of a target come with it.
+def _pictured(results: Results) -> list[str]:
+    return [name for name in [*results.conditions, *results.changed] if results.has_pictures(name)]
 
-    Of the ``FIRST`` targets whose differences between methods are nearest to the mean ones, with all methods, first
-    those on the displays, then those on each changed display; then target by target all.
+
+def pictures(
+    report: Report,
+    known: Mapping[Cell, Path],
+    room: int,
+    content: Callable[[Path], bytes] = Path.read_bytes,
+    size: Callable[[bytes], int] = lambda content: -(-len(content) // 3) * 4,  # in base64
+) -> dict[Cell, bytes]:
+    """The pictures that fit into ``room`` bytes, those first that answer most; what comes together comes all or not.
+
+    Of the ``FIRST`` targets whose differences between methods are nearest to the mean ones come those of all methods,
+    first on the displays, then on each changed display; then target by target all. A target comes with its captures.
     """
-    results = report.results
-    if not known:
-        return
+    results, kept = report.results, dict[Cell, bytes]()
     names = [*results.conditions, *results.changed]
     tables = [pd.DataFrame([results.values(label, name) for label in results.methods(name)]) for name in names]
     between = pd.concat([values - values.mean() for values in tables])
@@ -275,18 +266,9 @@ def groups(report: Report, known: Mapping[Cell, Path]) -> Iterator[dict[Cell, Pa
     near = [results.targets[index] for index in away.sort_values(kind="stable").index]
     wanted = [(target, results.conditions) for target in near[:FIRST]]
     wanted += [(target, [name]) for target in near[:FIRST] for name in results.changed]
-    wanted += [(target, names) for target in near]
-    for target, these in wanted:
-        yield {cell: path for cell, path in known.items() if cell[2] == target and (not cell[0] or cell[1] in these)}
-
-
-def _fitting(
-    wanted: Iterator[dict[Any, Path]], room: int, content: Callable[[Path], bytes], size: Callable[[bytes], int]
-) -> dict[Any, bytes]:
-    """The contents of groups of files, first things first: what is new of a group comes all or, without room, not."""
-    kept: dict[Any, bytes] = {}
-    for group in wanted:
-        new = {key: content(path) for key, path in group.items() if key not in kept}
+    for target, these in [*wanted, *((target, names) for target in near)]:
+        cells = [cell for cell in known if cell[2] == target and (not cell[0] or cell[1] in these)]
+        new = {cell: content(known[cell]) for cell in cells if cell not in kept}
         if (taken := sum(map(size, new.values()))) <= room:
             kept, room = kept | new, room - taken
     return kept
@@ -300,20 +282,8 @@ def _numbers(results: Results, held: Mapping[Cell, bytes]) -> Json:
             label: [number((label, name if label else results.reference(name), target)) for target in results.targets]
             for label in ("", *results.methods(name))
         }
-        for name in [*results.conditions, *results.changed]
-        if results.has_pictures(name)
+        for name in _pictured(results)
     }
-
-
-def _note(report: Report, held: int, there: int) -> str:
-    scored = report.results.layout.text.scored
-    if not there:
-        return f"This page holds no pictures: there were no thumbnails of {scored}s when it was written."
-    return (
-        f"This page holds {f'all {there}' if held == there else f'{held} of {there}'} pictures of the study, 8-bit sRGB, "
-        f"pixel for pixel from the records, or the report's WebP copies where these are not there; {scored}s are "
-        f"registered and matched in intensity, and reduced where the longer side would exceed {LONGEST_THUMBNAIL} pixels."
-    )
 
 
 def keep_copies(report: Report) -> None:
@@ -321,18 +291,17 @@ def keep_copies(report: Report) -> None:
 
     Nothing changes where a report is written again without its records, nor in a folder that is somebody else's.
     """
-    folder = report.thumbnails.copies
+    folder, known = report.thumbnails.copies, files_of(report)
     is_ours = not folder.exists() or ((folder / MARK).is_file() and (folder / MARK).read_bytes() == SAYS)
     if not report.thumbnails.store.folder.is_dir() or not is_ours:
         return
-    wanted = ({path.stem: path for path in group.values()} for group in groups(report, files_of(report)))
-    kept = {stem: content for stem, content in _fitting(wanted, COPIED_BYTES, _encoded, len).items() if content}
+    held = pictures(report, known, COPIED_BYTES, _encoded, len)
+    kept = {f"{known[cell].stem}.webp": content for cell, content in held.items() if content}
     for old in folder.glob("*.webp"):
-        if old.stem not in kept:
+        if old.name not in kept:
             old.unlink()
-    for name, content in {MARK: SAYS, **{f"{stem}.webp": content for stem, content in kept.items()}}.items():
-        if kept:
-            write_atomically(folder / name, content)
+    for name, content in {MARK: SAYS, **kept}.items() if kept else ():
+        write_atomically(folder / name, content)
 
 
 def _encoded(path: Path) -> bytes:

@@ -2,6 +2,13 @@
 
 const MOST_COLUMNS = 9; // with the names of the methods
 
+for (const { cells } of Object.values(data.rows).flat()) {
+  cells.photographs = cells.captures === undefined ? null : (cells.training_captures ?? 0) + cells.captures; // that one picture needs
+}
+
+/** The headline metric by target of a method. */
+const valuesOf = (method) => data.rows[state.display].find((row) => row.method === method)?.values;
+
 /** The rows of the display that pass the filter, by group and sorted. */
 function shownRows() {
   const words = state.filter.toLowerCase().split(/\s+/);
@@ -15,7 +22,7 @@ function shownRows() {
   const sign = (state.order === "best" ? 1 : -1) * (column?.higher ? -1 : 1);
   const place = (row) => (column.key === "tier" ? row.tier || "~" : row.cells[column.key] ?? sign * Infinity); // holes stay below
   const compare = (a, b) => (column ? (place(a) === place(b) ? 0 : place(a) < place(b) ? -sign : sign) : sign * a.method.localeCompare(b.method, "en"));
-  const lacks = (row) => row.scored < data.targets.length;
+  const lacks = (row) => row.cells.n < data.targets.length;
   rows.sort((a, b) => lacks(a) - lacks(b) || compare(a, b));
   return data.groups.flatMap((group) => rows.filter(({ method }) => data.methods[method].group === group));
 }
@@ -64,7 +71,7 @@ function bodyRows(row) {
   const open = state.open === row.method;
   const swatch = element("span", { class: oracle ? "swatch hollow" : "swatch", "aria-hidden": "true" });
   swatch.style.setProperty("--colour", colour); // as in the figures
-  const lacking = row.scored < data.targets.length ? [`${row.scored} of ${data.targets.length} targets`] : [];
+  const lacking = row.cells.n < data.targets.length ? [`${row.cells.n} of ${data.targets.length} targets`] : [];
   const quiet = (kind, text) => element("span", { class: `quiet ${kind}` }, text && ` ${text}`);
   const attributes = { type: "button", "aria-expanded": open, "data-key": `open ${row.method}`, click: () => update({ open: open ? "" : row.method }) };
   const arrow = element("span", { class: "arrow", "aria-hidden": "true" }, open ? "▾" : "▸");
@@ -79,13 +86,13 @@ function bodyRows(row) {
 function shownCell({ key, low, high, digits, signed }, { method, tier, cells }) {
   if (key === "tier") return tier ? [element("span", { class: tier === "A" ? "tier first" : "tier" }, tier)] : ["–"];
   if (key === "photographs" && cells.photographs) {
-    return [[cells.once && `${number(cells.once)} once`, cells.each && `${number(cells.each)} a picture`].filter(Boolean).join(" + ")];
+    return [[cells.training_captures && `${number(cells.training_captures)} once`, cells.captures && `${number(cells.captures)} a picture`].filter(Boolean).join(" + ")];
   }
   const value = cells[key] ?? null;
   if (signed && method === data.baseline) return ["baseline"];
   if (key === "p" && value !== null && value < 0.001) return ["< 0.001"];
   const ends = [cells[low], cells[high]];
-  if (!(signed || key === data.headline.column) || value === null || ends[0] == null) return [number(value, digits, signed)];
+  if (!(signed || key === data.headline.key) || value === null || ends[0] == null) return [number(value, digits, signed)];
   const interval = element("span", { class: "interval" }, ` [${ends.map((end) => number(end, digits, signed)).join(", ")}]`);
   return [...(signed ? [forest(ends[0], value, ends[1])] : []), number(value, digits, signed), interval];
 }
@@ -103,7 +110,7 @@ function forest(low, mean, high) {
 
 /** Every target of a method: its score, its difference to the baseline, and the way to its picture. */
 function targetTable({ method }) {
-  const [ours, theirs] = [data.values[state.display][method], data.values[state.display][data.baseline]];
+  const [ours, theirs] = [valuesOf(method), valuesOf(data.baseline)];
   const compared = theirs && method !== data.baseline;
   const headings = ["target", data.headline.title, ...(compared ? [`difference to ${data.baseline}`] : []), "picture"];
   const lines = data.targets.map((target, index) => {

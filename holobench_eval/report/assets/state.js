@@ -2,7 +2,7 @@
 
 const DEFAULTS = {
   display: data.displays[0] ?? data.changed[0],
-  sort: data.headline.column, // a column
+  sort: data.headline.key, // a column
   order: "best", // or "worst"
   filter: "",
   photographs: "", // at most so many

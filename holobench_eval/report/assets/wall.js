@@ -24,7 +24,7 @@ function wallMethods() {
   if (asked.length) return asked;
   const names = wallTargets();
   const shown = shownRows().filter(({ method }) => names.some((target) => pictureOf(method, target) !== null));
-  const score = ({ cells }) => (data.headline.higher ? -1 : 1) * (cells[data.headline.column] ?? -Infinity);
+  const score = ({ cells }) => (data.headline.higher ? -1 : 1) * (cells[data.headline.key] ?? -Infinity);
   const best = shown.toSorted((a, b) => score(a) - score(b)).map(({ method }) => method);
   const ofGroups = data.groups.map((group) => best.find((method) => data.methods[method].group === group));
   const named = best.filter((method) => method === data.baseline || data.question?.split(/[\s,?]+/).includes(method));
@@ -79,7 +79,7 @@ async function drawTile(tile) {
   const { method, target, canvas, caption } = tile;
   const truth = await pixelsOf(pictureOf("", target));
   const pixels = method && state.mode !== "truth" ? await pixelsOf(pictureOf(method, target)) : truth;
-  const score = method ? withUnit(data.values[state.display][method][data.targets.indexOf(target)]) : "";
+  const score = method ? withUnit(valuesOf(method)[data.targets.indexOf(target)]) : "";
   let [image, text] = [null, score];
   if (method && ["error", "flip"].includes(state.mode) && truth.width === pixels.width && truth.height === pixels.height) {
     await new Promise((done) => setTimeout(done)); // the page answers between two maps
