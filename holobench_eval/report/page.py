@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import io
 import json
 import math
@@ -226,7 +227,7 @@ def policy(scripts: list[str], style: str) -> str:
 
 def plain(markdown: str) -> str:
     """What Markdown of one line shows."""
-    return re.sub(r"\\(?=[\\`*|~$_\]])|`", "", markdown)
+    return html.unescape(re.sub(r"\\(?=[\\`*|~$_\]])|`", "", markdown))
 
 
 def files_of(report: Report) -> dict[Cell, Path]:

@@ -16,7 +16,7 @@ from holobench_eval.report.data.scores import parse
 from holobench_eval.report.data.tables import read_records, records_frame
 from holobench_eval.report.files.dictionary import File, dictionary
 from holobench_eval.report.files.dictionary import column as described
-from holobench_eval.report.page.data import page_data
+from holobench_eval.report.page import page_data
 from holobench_eval.report.section import Report
 from tests.support import budget_study as budget
 
@@ -115,9 +115,9 @@ def test_a_figure_of_a_run_takes_one_entry(tmp_path: Path) -> None:
     assert "| `energy_j` | Energy that solving took | J | number |" in dictionary
     assert "| `energy_j` | Energy of solving, mean over cells | J | number |" in dictionary
     page = page_data(Report(results, records, tmp_path, {}, Description()))
-    assert {"key": "energy_j", "heading": "energy per hologram [J]", "higher": False} in page["columns"]
+    assert {"key": "energy_j", "heading": "energy per hologram [J]"} in page["columns"]
     row = next(row for row in page["rows"]["leto-aged"] if row["method"] == "double_phase")
-    assert row["cells"]["energy_j"] == {"text": "5", "value": 5.0}
+    assert row["cells"]["energy_j"] == 5.0
     pd.testing.assert_frame_equal(read_records((tmp_path / "records.csv").read_text()), results.frame)
     committed = [{"row": row} for row in results.frame.to_dict("records")]
     pd.testing.assert_frame_equal(records_frame(committed, budget.layout()), results.frame)
