@@ -54,8 +54,7 @@ function update(changes) {
 const chosen = () => Object.entries(state).filter(([key, value]) => value !== DEFAULTS[key]);
 
 function writeAddress() {
-  const names = { display: state.display, ...Object.fromEntries(chosen()) };
-  byId("link").href = `#${new URLSearchParams(names)}`;
+  byId("link").href = `#${new URLSearchParams([["display", state.display], ...chosen().filter(([key]) => key !== "display")])}`;
   history.replaceState(null, "", byId("link").href);
 }
 
@@ -78,6 +77,7 @@ function land() {
 }
 
 const state = readAddress();
+byId("link").href = `#${new URLSearchParams({ display: state.display })}`;
 history.scrollRestoration = "manual";
 window.addEventListener("hashchange", () => {
   if (!location.hash.includes("=")) return writeAddress(); // a link within the page keeps the view
