@@ -165,7 +165,7 @@ def _row(results: Results, label: str, name: str, drawn: Json) -> Json:
     if gain and label != results.layout.baseline:
         cells |= {"difference": gain.mean, "lowest": gain.low, "highest": gain.high}
         cells["p"] = (drawn.get("difference") or {}).get("p", math.nan)
-    known = {key: drawn[key] for key in ("tier", "marks", "verdict") if key in drawn}
+    known: Json = {key: drawn[key] for key in ("tier", "marks", "verdict") if key in drawn}
     numbers = {key: to_json(value) for key, value in cells.items() if isinstance(value, (int, float))}
     values = list(map(to_json, results.values(label, name)))
     return {"method": label, "tier": "", "marks": [], "verdict": None, **known, "cells": numbers, "values": values}
@@ -239,7 +239,8 @@ def files_of(report: Report) -> dict[Cell, Path]:
         for name in dict.fromkeys(map(results.reference, names))
         for target in results.targets
     }
-    paths |= {(row.label, row.condition, row.target): thumbnails.of_capture(row.cell) for row in done.itertuples()}
+    for label, name, target, cell in done[["label", "condition", "target", "cell"]].to_numpy():
+        paths[label, name, target] = thumbnails.of_capture(cell)
     return {cell: path for cell, path in paths.items() if path.is_file()}
 
 

@@ -90,6 +90,6 @@ watch(CONTROLS, () => CONTROLS.forEach((key) => (byId(key).value = state[key])))
 /** Sentences and charts of the chosen display, and those of no display. */
 watch(["display"], () => {
   const others = [...data.displays, ...data.changed].filter((name) => name !== state.display && !state.display.startsWith(`${name},`));
-  for (const line of byId("answer").querySelectorAll("li")) line.hidden = others.some((name) => line.textContent.startsWith(`${name}: `));
+  for (const line of byId("answer").querySelectorAll("li")) line.hidden = others.some((name) => [": ", ", "].some((end) => line.textContent.startsWith(name + end)));
   for (const chart of byId("charts").querySelectorAll("[data-name]")) chart.hidden = others.some((name) => chart.dataset.name.endsWith(`-${name}`));
 });
