@@ -18,8 +18,7 @@ from .charts.tiles import draw_wall, spread
 from .description import Description, describe
 from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks
-from .page import write_page
-from .page.pictures import keep_copies
+from .page import keep_copies, write_page
 from .results import Results, of_study, read_records, records_frame, records_text
 from .stories import parts
 from .stories.overview import chosen

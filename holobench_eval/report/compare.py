@@ -14,11 +14,11 @@ import pandas as pd
 from ..core.errors import UserError, one_line, suggest
 from ..study.plan import REFERENCE, is_reference
 from ..study.running import provenance
+from .markdown import Markdown, blocks, heading, table
+from .results import DONE, clusters_in, csv_text, read_records, records_text, score_columns
 from .scores import Score, parse
 from .statistics import Estimate, family_p, mean_interval
-from .results import DONE, clusters_in, csv_text, read_records, records_text, score_columns
 from .text import bracketed, words
-from .markdown import Markdown, blocks, heading, table
 
 # What names a cell in records.csv whatever code computed it: the same in two runs of a study.
 CELL = ("label", "condition", "target", "repeat")

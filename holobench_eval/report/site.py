@@ -25,12 +25,12 @@ from ..core.io import TEMPORARY, read_text, write_atomically
 from ..display.simulated.profile import load_profile, names
 from ..display.simulated.shelf import installed
 from ..study.running import provenance
+from .markdown import captions
+from .page import asset, plain, policy, templates
+from .results import MOST_BYTES
 from .scores import Score, parse
 from .statistics import Estimate
-from .results import MOST_BYTES
 from .text import grouped, number
-from .markdown import captions
-from .page.html import asset, plain, policy, templates
 
 MARK = '<meta name="generator" content="holoeval site">'  # in a page that this module wrote
 PICTURE, ROOM = "answer-pictures.jpg", 1_200_000  # the picture of a card, and the most bytes of it

@@ -12,8 +12,8 @@ import pytest
 
 from holobench_eval.core.errors import UserError
 from holobench_eval.report.compare import Comparison, compare, read_run
-from holobench_eval.report.statistics import family_p, mean_interval
 from holobench_eval.report.results import csv_text
+from holobench_eval.report.statistics import family_p, mean_interval
 from tests.support.records_on_disk import Scores, write_report
 
 BASE = [20.0, 21.0, 22.0, 23.0]

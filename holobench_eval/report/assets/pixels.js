@@ -1,16 +1,10 @@
 // Pictures: decoded when they are first looked at, and turned into what is to be seen of them.
 
 const decoded = new Map(); // number of a picture: a promise of its ImageData
-const MOST_DECODED = 24;
+const MOST_DECODED = 64;
 
-const targetIndex = () => data.targets.indexOf(state.target);
-
-/** The number of a picture in this page, or null; option: "truth", or a kind and a method, "capture:METHOD". */
-function pictureOf(option, target = state.target) {
-  const { targets, cells } = data.pictures;
-  const numbers = option === "truth" ? targets[state.display] : cells[state.display]?.[option.slice(option.indexOf(":") + 1)];
-  return numbers?.[data.targets.indexOf(target)] ?? null;
-}
+/** The number of a capture in this page, or of the target without a method; null where there is none. */
+const pictureOf = (method, target) => data.pictures[state.display]?.[method]?.[data.targets.indexOf(target)] ?? null;
 
 /** The pixels of a picture as they are stored. */
 function pixelsOf(number) {
@@ -29,10 +23,8 @@ async function decode(base64) {
   return context.getImageData(0, 0, bitmap.width, bitmap.height);
 }
 
-/** Show an image on a canvas, pixel for pixel; nothing where there is none. */
+/** Show an image on a canvas, pixel for pixel. */
 function put(canvas, image) {
-  canvas.hidden = !image;
-  if (!image) return;
   [canvas.width, canvas.height] = [image.width, image.height];
   canvas.getContext("2d").putImageData(image, 0, 0);
 }
