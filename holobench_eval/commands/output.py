@@ -83,7 +83,6 @@ def print_headline(console: Console, results: Results) -> None:
 
 def board_of(drawn: Board, display: Display) -> Table:
     """A display's board for a terminal; the report has the other columns. Only names are broken into lines."""
-    from ..report.board import GROUPS
     from ..report.text import FILES, number
 
     results, score = drawn.results, drawn.results.headline
@@ -98,7 +97,7 @@ def board_of(drawn: Board, display: Display) -> Table:
         table.add_column("photos", justify="right", no_wrap=True)
     for group, rows in display.groups:
         if len(display.groups) > 1:
-            table.add_row("", f"[bold]{GROUPS[group]}[/]")
+            table.add_row("", f"[bold]{group}[/]")
         for row in rows:
             cells = [row.tier, ", ".join([row.label, *drawn.marks(row)]), score.number(row.score.mean)]
             if results.baseline:

@@ -1,8 +1,8 @@
 """The board of a study: its methods on each display, best first, in groups and tiers, with what each of them cost.
 
-Methods of one group were given as much of the camera. A letter holds the methods of a group that no test tells from the
-best of the letter (``statistics.tiers``). board.json is the board in the numbers of table.csv; report.md, the page, the
-site, the terminal and the tables of the documentation are drawn from it.
+Methods of one group were given as much of the camera and show as many frames. A letter holds the methods of a group
+that nothing tells from the best of the letter (``statistics.tiers``). board.json is the board in the numbers of
+table.csv; report.md, the page, the site, the terminal and the tables of the documentation are drawn from it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..study.plan import is_reference
 from .columns import dictionary
 from .facts import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .latex import latex_tables
@@ -23,6 +24,7 @@ from .phrases import marks, verdict
 from .results import Results, csv_text, to_json
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
+from .text import grouped, number
 
 # In the order of the board.
 GROUPS = {
@@ -32,36 +34,53 @@ GROUPS = {
     GIVEN: "Photographs that were given",
     ORACLE: "Knows the display: the best phase known",
 }
-VERSION = 1
+SEVERAL = ", several frames in an exposure"
+VERSION = 2
+# By the unit of a headline: how far behind the best of its letter a row begins the next one at least, since another
+# seed moves a score by 0.03 dB, and how far behind it a row with the same letter is at most.
+MARGINS = {"dB": (0.1, 1.0)}
 
 
 @dataclass(frozen=True)
 class Row:
     """A method on a display.
 
-    tier: its letter (empty: a target is missing, there is no test, or it is an oracle); score: mean of the headline
-    with its interval; scored: of how many targets; test: against the baseline (None: it is the baseline, or lacks a
-    target); beside: means of other scores; photographs: in total, those of its training included; panel_time: frames
-    shown for a picture, photographs included (None: holograms have one frame each); seconds, memory: of one hologram,
-    memory in MiB (None: unknown); marks: what must be known of it.
+    category: see ``facts``; frames: of a hologram, which share one exposure; tier: its letter (empty: a target is
+    missing, there is no test, or it is an oracle); score: mean of the headline with its interval; scored: of how many
+    targets; test: against the baseline (None: it is the baseline, or lacks a target); beside: means of other scores;
+    photographs: in total, those of its training included; once, each: of its training, and of each target; panel_time:
+    frames shown for a picture, photographs included (None: holograms have one frame each); seconds, memory: of one
+    hologram, of all processors, memory in MiB (None: unknown); marks: what must be known of it.
     """
 
     label: str
+    category: str
+    frames: float
     tier: str
     score: Estimate
     scored: int
     test: PairedTest | None
     beside: tuple[float, ...]
     photographs: float | None
+    once: float
+    each: float
     panel_time: float | None
     seconds: float | None
     memory: float | None
     marks: tuple[str, ...]
 
+    @property
+    def camera(self) -> str:
+        """The photographs that it takes, in words: ``62 once``, ``100 a picture``; 0 for none, a dash where unknown."""
+        if self.photographs is None:
+            return "–"
+        counts = ((self.each, "a picture"), (self.once, "once"))
+        return " and ".join(f"{number(count)} {how}" for count, how in counts if count) or "0"
+
 
 @dataclass(frozen=True)
 class Display:
-    """The methods on a display, by group, best first; floor: the mean of a constant image (None: unknown)."""
+    """The methods on a display, by the name of their group, best first; floor: mean of a constant image (or None)."""
 
     name: str
     groups: tuple[tuple[str, tuple[Row, ...]], ...]
@@ -103,8 +122,7 @@ class Board:
                     "name": display.name,
                     "floor": to_json(display.floor),
                     "groups": [
-                        {"name": GROUPS[group], "rows": [self._row(row) for row in rows]}
-                        for group, rows in display.groups
+                        {"name": group, "rows": [self._row(row) for row in rows]} for group, rows in display.groups
                     ],
                 }
                 for display in self.displays
@@ -123,6 +141,7 @@ class Board:
             "verdict": verdict(self.results.headline, row.test) if row.test else None,
             "beside": {score.key: to_json(value) for score, value in zip(self.beside, row.beside, strict=True)},
             "photographs": to_json(row.photographs),
+            "camera": row.camera,
             "panel_time": to_json(row.panel_time),
             "seconds": to_json(row.seconds),
             "memory_mib": to_json(row.memory),
@@ -137,32 +156,50 @@ def board(results: Results) -> Board:
     return Board(results, tuple(beside), tuple(_display(results, name, tuple(beside)) for name in results.conditions))
 
 
+def groups_of(results: Results) -> dict[str, str]:
+    """The group of each method, by its label, in the order of the board: who was given as much of the camera, and shows
+    as many frames in an exposure, which take as many times the panel's time."""
+    frames = results.frame.groupby("label")["frames"].max() if "frames" in results.frame else {}
+    several = {label: frames.get(label, 1) > 1 for label, name in results.cells if not is_reference(name)}
+    return {
+        label: f"{name}{SEVERAL * more}"
+        for category, name in GROUPS.items()
+        for more in (False, True)
+        for label in several
+        if results.category(label) == category and several[label] == more
+    }
+
+
 def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Display:
-    groups = []
-    for category in GROUPS:
-        labels = [label for label in results.methods(condition) if results.category(label) == category]
-        if labels:
-            groups.append((category, tuple(_rows(results, condition, labels, beside))))
-    return Display(condition, tuple(groups), results.floor(condition))
+    here = results.methods(condition)
+    members = grouped((group, label) for label, group in groups_of(results).items() if label in here)
+    ordered = {group: sorted(labels, key=here.index) for group, labels in members.items()}
+    groups = tuple((group, tuple(_rows(results, condition, labels, beside))) for group, labels in ordered.items())
+    return Display(condition, groups, results.floor(condition))
 
 
 def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Score, ...]) -> Iterator[Row]:
     complete = [label for label in labels if results.is_complete(label, condition)]
     complete.sort(key=lambda label: -results.headline.sign * _mean(results, label, condition))
     values = np.array([results.values(label, condition) for label in complete])
-    letters = dict(zip(complete, tiers(values, results.clusters), strict=True))
+    margin, most = MARGINS.get(results.headline.unit, (0.0, np.inf))
+    letters = dict(zip(complete, tiers(values, margin, most, results.clusters), strict=True))
     for label in [*complete, *(label for label in labels if label not in complete)]:
         row = results.rows[label, condition]
         yield Row(
             label,
+            results.category(label),
+            float(row.get("frames", 1)),
             letters.get(label, "") if results.category(label) != ORACLE else "",
             results.headline.of(row),
             int(row["n"]),
             results.tested(label, condition),
             tuple(float(row[score.column]) for score in beside),
             _known(row, "total_captures"),
+            _known(row, "training_captures") or 0.0,
+            _known(row, "captures") or 0.0,
             _known(row, "panel_time"),
-            _known(row, "solving_s"),
+            _known(row, "cpu_s"),
             _known(row, "memory_mib"),
             (*marks(results, label, condition), *(["no better than gray"] * is_gray(results, label, condition))),
         )

@@ -30,7 +30,7 @@ from matplotlib import colormaps
 from PIL import Image
 
 from ..core.io import write_atomically
-from .board import GROUPS, board
+from .board import board, groups_of
 from .charts.look import looks
 from .columns import costs
 from .facts import ORACLE
@@ -47,7 +47,7 @@ OWN = 200_000  # bytes that the template, the policy and the origin may take bes
 CHARTS = ("quality-*", "error-budget*", "sweep-*", "training-*", "stages-*")  # figures of the report that the page has
 SCRIPTS = ("dom", "state", "pixels", "flip", "board", "wall")
 
-ESSENTIAL = ("photographs", "solving_s", "panel_time", "memory_mib")  # columns of costs that stand first
+ESSENTIAL = ("photographs", "cpu_s", "panel_time", "memory_mib")  # columns of costs that stand first
 FIRST = 3  # targets whose pictures come before those of the others
 COPIED_BYTES = 1_200_000  # of all pictures that a report keeps: thirty reports leave a clone below 60 MB
 QUALITY = 75  # of WebP, 0 to 100: two thirds of the bytes of 85, 1 dB further from the capture
@@ -97,7 +97,7 @@ def page_data(report: Report) -> Json:
     beside = dict.fromkeys(key for row in rows.values() for key in row["beside"])
     titles = {method: row["title"] for (_, method), row in rows.items()}
     columns = _columns(results, list(map(parse, beside)))
-    category = dict(zip(results.table["label"], results.table["category"], strict=True))
+    group = groups_of(results)
     return {
         "question": drawn["question"],
         "headline": drawn["headline"] | columns[1],
@@ -108,17 +108,17 @@ def page_data(report: Report) -> Json:
         "floors": {part["name"]: part["floor"] for part in drawn["displays"]},
         "columns": columns,
         "targets": results.targets,
-        "groups": list(GROUPS.values()),
+        "groups": list(dict.fromkeys(group.values())),
         "methods": {
             label: {
                 "title": titles.get(label) or label,
                 "registered": results.names[label],
-                "group": GROUPS[category[label]],
-                "oracle": category[label] == ORACLE,
+                "group": group[label],
+                "oracle": results.category(label) == ORACLE,
                 "colour": look.colour,  # the same as in the figures
             }
             for label, look in looks(results.names).items()
-            if category.get(label) in GROUPS
+            if label in group
         },
         "rows": {
             name: [_row(results, label, name, rows.get((name, label), {})) for label in results.methods(name)]

@@ -85,7 +85,7 @@ def _dominating(results: Results, label: str, condition: str) -> str:
     """The best method without photographs that is as fast as a network without photographs, where the network is not
     shown to be better; empty where there is none."""
     rows = {name: results.rows[name, condition] for name in results.ranking(condition)}
-    blind = {name: row.get("solving_s", np.nan) for name, row in rows.items() if row.get("total_captures") == 0}
+    blind = {name: row.get("cpu_s", np.nan) for name, row in rows.items() if row.get("total_captures") == 0}
     if label not in blind or label not in results.facts.labels("trained"):
         return ""
     rival = next(name for name, seconds in blind.items() if name == label or seconds <= blind[label])

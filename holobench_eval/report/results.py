@@ -34,6 +34,7 @@ from .text import FILES, Text
 
 Record = Mapping[str, Any]  # as ``study.store.Store.load`` gives it
 DONE, CONSTANT = "done", "floor_constant"
+DISTURBED = 1.3  # times the processor time: a solution that took longer waited for something else
 MOST_BYTES = 64_000_000  # of a file of numbers of one study
 # Metrics of the main table besides the headline.
 LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd", control.NAME)
@@ -513,7 +514,9 @@ class Results:
                 return float(getattr(done[column.name], column.table)())
             case "median_alone":  # a machine that stood still for minutes does not move it
                 alone = done[done["timed_alone"] == 1] if "timed_alone" in done else done
-                return float((done if alone.empty else alone)[column.name].median())
+                wall = float((done if alone.empty else alone)[column.name].median())
+                cpu = done["cpu_s"].median() if "cpu_s" in done else math.nan
+                return math.nan if wall > DISTURBED * cpu else wall
             case "together":
                 return " ".join(sorted({*done[column.name]} - {""}))
             case "total_captures":  # failed cells have taken theirs, too; repeats are averaged, of failed ones apart

@@ -150,7 +150,7 @@ def _row(row: Mapping[str, Any], score: Score) -> dict[str, str]:
         "score": score.number(math.nan if row["score"]["mean"] is None else float(row["score"]["mean"])),
         "difference": "" if math.isnan(change.mean) else score.estimate(change, signed=True) + unclear,
         "verdict": str(row["verdict"] or ""),
-        "photographs": number(row["photographs"]),
+        "photographs": row["camera"],
         "seconds": number(row["seconds"]),
     }
 

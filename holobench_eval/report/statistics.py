@@ -183,15 +183,17 @@ def family_p(differences: Array, clusters: Clusters | None = None) -> Array:
     return np.where(tested, p, np.nan)
 
 
-def tiers(values: Array, clusters: Clusters | None = None) -> list[str]:
-    """A letter for each of some rows, from best to worst: those that no test tells from the best of their letter.
+def tiers(values: Array, margin: float, most: float, clusters: Clusters | None = None) -> list[str]:
+    """A letter for each of some rows, from best to worst: those that nothing tells from the best of their letter.
 
-    All pairs are one family of tests (``family_p``). Going down, the first row that is shown to be below the best of a
-    letter begins the next one. Without a test, for too few clusters, no row has a letter.
+    All pairs are one family of tests (``family_p``). Going down, the first row that a test shows to be below the best
+    of a letter, and that is more than the margin below it, begins the next one: another training, or another seed,
+    moves a row by less. Where a letter would hold a row that is more than ``most`` below its best, the targets are too
+    few to tell rows apart, and no row has a letter; nor has any without a test.
 
     values: ``(rows, targets)``, best row first, without holes.
     """
-    rows = len(values)
+    rows, means = len(values), values.mean(1) if len(values) else values
     pairs = [(first, second) for first in range(rows) for second in range(first + 1, rows)]
     if not pairs:
         return ["A"] * rows
@@ -199,14 +201,17 @@ def tiers(values: Array, clusters: Clusters | None = None) -> list[str]:
     if np.isnan(adjusted).any():
         return [""] * rows
     p = dict(zip(pairs, adjusted, strict=True))
-    best, found = 0, ["A"]
+    best, letters = 0, ["A"]
     for row in range(1, rows):
-        if p[best, row] < SIGNIFICANCE:
-            best, letter = row, chr(ord(found[-1]) + 1)
-            found.append(letter if letter <= "Z" else "Z")
+        apart = abs(means[best] - means[row])
+        if p[best, row] < SIGNIFICANCE and apart > margin:
+            best, letter = row, chr(ord(letters[-1]) + 1)
+            letters.append(letter if letter <= "Z" else "Z")
+        elif apart > most:
+            return [""] * rows
         else:
-            found.append(found[-1])
-    return found
+            letters.append(letters[-1])
+    return letters
 
 
 @lru_cache(maxsize=8)

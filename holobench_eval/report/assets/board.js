@@ -16,7 +16,7 @@ function shownRows() {
   const rows = data.rows[state.display].filter(({ method, cells, marks }) => {
     const { title, registered, group } = data.methods[method];
     const text = [method, title, registered, group, ...marks].join(" ").toLowerCase();
-    return words.every((word) => text.includes(word)) && within(cells.photographs, state.photographs) && within(cells.solving_s, state.seconds);
+    return words.every((word) => text.includes(word)) && within(cells.photographs, state.photographs) && within(cells.cpu_s, state.seconds);
   });
   const column = data.columns.find(({ key }) => key === state.sort);
   const sign = (state.order === "best" ? 1 : -1) * (column?.higher ? -1 : 1);

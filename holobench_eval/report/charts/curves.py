@@ -70,7 +70,7 @@ def _finish(axes: Axes, quality: str) -> None:
 
 def _rows(display: Display) -> list[Row]:
     """Those with every target and a known number of photographs, without oracles."""
-    rows = [row for group, rows in display.groups for row in rows if group != ORACLE]
+    rows = [row for row in display.rows if row.category != ORACLE]
     return [row for row in rows if row.photographs is not None and math.isfinite(row.score.mean) and row.scored]
 
 
