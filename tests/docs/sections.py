@@ -3,18 +3,11 @@
 import json
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from holobench_eval.core.parameters import allowed, resolved
 
 LONGEST = 5  # names that a cell lists; of more, holoeval list has them
-
-
-def introduction(page: Path, module: str) -> str:
-    """What stands on a page above the line that says which module writes the rest, and the line."""
-    mark = f"<!-- What follows is written by: python -m tests.docs.{module} -->\n"
-    return page.read_text(encoding="utf-8").partition(mark)[0] + mark
 
 
 def mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]]:

@@ -1,15 +1,18 @@
 """Pages and tables of the documentation are what the code and the committed reports say."""
 
 import re
-from types import ModuleType
 
 import pytest
 
 from holobench_eval.core.parameters import parameters
+from holobench_eval.display.api import DisplaySpec
+from holobench_eval.display.metered import MeteredDisplay
 from holobench_eval.display.simulated.profile import Profile
-from tests.docs import config_page, display_page, handles_page
+from holobench_eval.display.training import TrainingBench
+from tests.docs import config_page, display_page
 from tests.docs.boards import BLOCK, PAGES, ROOT, TIMED, drawn
 
+OWN = {"simulation", "seed", "known", "journal"}  # of a handle: what the harness and the oracle use
 WORDS = {"name", "version", "seed", "description", "like"}  # keys of no quantity
 
 
@@ -20,13 +23,25 @@ def test_a_table_is_drawn_from_its_report(page: str) -> None:
     assert drawn(text) == text, "draw it: python -m tests.docs.boards"
 
 
-@pytest.mark.parametrize("module", [config_page, display_page, handles_page])
-def test_a_page_is_that_of_schema_and_docstrings(module: ModuleType) -> None:
-    assert module.PAGE.read_text(encoding="utf-8") == module.page(), f"write it: python -m {module.__name__}"
+def test_the_page_on_configs_is_that_of_their_schema() -> None:
+    assert config_page.PAGE.read_text(encoding="utf-8") == config_page.page(), (
+        f"write it: python -m {config_page.__name__}"
+    )
+
+
+def test_the_page_on_displays_has_the_place_of_its_tables() -> None:
+    assert display_page.PAGE.read_text(encoding="utf-8").count(display_page.MARK) == 1
+
+
+@pytest.mark.parametrize("handle", [MeteredDisplay, TrainingBench, DisplaySpec])
+def test_the_page_on_python_names_all_that_a_method_sees(handle: type) -> None:
+    text = (ROOT / "docs" / "start" / "python.md").read_text(encoding="utf-8")
+    names = {*vars(handle), *getattr(handle, "__dataclass_fields__", ())} - OWN
+    assert sorted(name for name in names if name[0] != "_" and not re.search(rf"`{name}\b", text)) == []
 
 
 def test_every_key_of_a_display_has_a_row_and_every_quantity_a_unit() -> None:
-    text = display_page.page()
+    text = display_page.tables()
     for parameter in parameters(Profile):
         *_, key = parameter.name.split(".")
         assert f"\n| `{key}` |" in text, parameter.name
@@ -35,6 +50,6 @@ def test_every_key_of_a_display_has_a_row_and_every_quantity_a_unit() -> None:
 
 
 def test_every_stage_has_its_model_with_its_source() -> None:
-    text = display_page.page()
+    text = display_page.tables()
     assert "Crosstalk: Gaussian convolution of the phase on sub-samples" in text
     assert text.count("(paper") > 10
