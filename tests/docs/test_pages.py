@@ -2,6 +2,7 @@
 
 import re
 
+import pandas as pd
 import pytest
 
 from holobench_eval.core.parameters import parameters
@@ -61,3 +62,20 @@ def test_every_stage_has_its_model_with_its_source() -> None:
     text = display_page.tables()
     assert "Crosstalk: Gaussian convolution of the phase on sub-samples" in text
     assert text.count("(paper") > 10
+
+
+def test_the_examples_with_pandas_print_differences_and_tests(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "docs" / "start" / "reading-a-report.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(ROOT)
+    printed = []
+    for example in re.findall(r"<!-- pandas -->\n```python\n(.*?)```", text, re.DOTALL):
+        exec(example, {})
+        printed.append(capsys.readouterr().out)
+    differences, rows = printed
+    tests = pd.read_csv("reports/board/tests.csv").query("label == 'hil'").set_index("condition")
+    for condition, difference in tests["difference_db"].items():
+        (value,) = re.findall(rf"^{condition}\s+(\S+)$", differences, re.MULTILINE)
+        assert float(value) == pytest.approx(difference, abs=2e-5)
+    assert [line.split()[1] for line in rows.splitlines() if re.match(r"\d", line)] == tests.index.tolist()
