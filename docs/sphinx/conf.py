@@ -34,7 +34,7 @@ extensions = [
     "formulas",
 ]
 root_doc = "docs/start/index"
-include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/*/report.md", "reports/*/details.md"]
+include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/**/report.md", "reports/**/details.md"]
 exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests", "configs"]
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
