@@ -32,8 +32,7 @@ STACKS = {"focus": "refocuses", "views": "has an eye's pupil"}
 class Learned:
     """A display that is the frozen network of a trained method (paper 6.3).
 
-    method: the method, by its registered name or as ``path/to/file.py:Name``; profile: the display whose captures it
-    is trained on; params: parameters of the method.
+    method: which one; profile: the display whose captures it is trained on; params: parameters of the method.
     """
 
     method: Text
@@ -75,8 +74,8 @@ class DisplayGrid:
 class Targets:
     """The images that are scored.
 
-    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset, whose paths start in the
-    working directory; only: some of its images (none: all).
+    dataset: which one; params: its parameters, whose paths start in the working directory; only: some of its images
+    (none: all).
     """
 
     dataset: Text
@@ -88,9 +87,9 @@ class Targets:
 class Training:
     """The images that methods may train on, never scored; equal for all methods of a study.
 
-    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset;
-    held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
-    method may take for its training, those of held-out images included (None: no limit).
+    dataset: which one; params: its parameters; held_out: how many of the last images are kept back to watch the
+    training; captures: the most that a method may take for its training, those of held-out images included (None: no
+    limit).
     """
 
     dataset: Text = "dead_leaves"
@@ -103,7 +102,7 @@ class Training:
 class Probe:
     """The method whose holograms are shown when predictions of captures are scored (paper Table 1).
 
-    name: a registered name or ``path/to/file.py:Name``; params: parameters of the method.
+    name: which one; params: its parameters.
     """
 
     name: Text = "wirtinger"
@@ -141,7 +140,7 @@ class Sweep:
 class MethodEntry:
     """A method of a study.
 
-    name: a registered name or ``path/to/file.py:Name``; label: its name in tables (empty: its name, or that of its
+    name: which one; label: its name in tables (empty: its name, or that of its
     class); params: parameters of the method; grid: lists of values of further parameters, for a row with each
     combination; profiles: the displays it is shown on, a subset of the study's; captures: the most that the display
     allows a method with a camera for one target (None: no limit); exposure: of its scored captures (None: that of the

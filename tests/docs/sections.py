@@ -53,7 +53,7 @@ def _short(entry: Any) -> Any:
     if not isinstance(entry, dict):
         return entry
     if len(entry.get("enum", ())) > LONGEST:
-        return {"type": "a name of `holoeval list`"}
+        return {"type": "name"}
     if "pattern" in entry:
-        return {"type": "`path/to/file.py:Name`" if "py" in entry["pattern"] else "`path/to/file.yaml`"}
+        return {"type": "`file.py:Name`" if "py" in entry["pattern"] else "`file.yaml`"}
     return {key: _short(part) for key, part in entry.items()}
