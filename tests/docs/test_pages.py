@@ -79,3 +79,34 @@ def test_the_examples_with_pandas_print_differences_and_tests(
         (value,) = re.findall(rf"^{condition}\s+(\S+)$", differences, re.MULTILINE)
         assert float(value) == pytest.approx(difference, abs=2e-5)
     assert [line.split()[1] for line in rows.splitlines() if re.match(r"\d", line)] == tests.index.tolist()
+
+
+def means(study: str) -> dict[tuple[str, str], float]:
+    """PSNR of a committed report, by label and condition."""
+    rows = pd.read_csv(ROOT / "reports" / study / "table.csv")
+    return dict(zip(zip(rows["label"], rows["condition"], strict=True), rows["psnr_linear_db"], strict=True))
+
+
+def test_numbers_that_pages_quote_are_those_of_reports() -> None:
+    first, reading = (
+        " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        for page in ("README.md", "docs/start/reading-a-report.md")
+    )
+    board, moved = means("board"), means("robustness")
+    aged, near, levels = (
+        {label: board[label, display] for label, condition in board if condition == display}
+        for display in ("leto-aged", "leto-2020", "plm-4bit")
+    )
+    known, lost = levels["nearest_level"], moved["hil_plus", "leto-2020"]
+    assert f"{aged['twin']:.1f} dB through a twin, and the other {near['twin']:.1f}?" in first
+    assert (
+        f"it has {known:.1f} dB, `hil` {known - levels['hil']:.1f} dB less, a twin {levels['twin'] - known:.1f}"
+        in first
+    )
+    assert f"on `leto-aged` {aged['parametric_model'] - aged['hil_plus']:.1f} dB better" in first
+    assert all(abs(each["parametric_model"] - each["hil_plus"]) < 0.1 for each in (near, levels))
+    assert f"costs `hil_plus` [{lost - moved['hil_plus', 'leto-2020, camera shift x -40 mm']:.1f} dB]" in first
+    tests = pd.read_csv(ROOT / "reports" / "table3" / "tests.csv").set_index("label").loc["hybrid_model"]
+    mean, low, high = tests[["difference_db", "difference_lo_db", "difference_hi_db"]]
+    assert f"`hybrid_model` has {means('table3')['hybrid_model', 'leto-2020']:.2f} dB" in reading
+    assert f"**{mean:+.2f} dB [{low:+.2f}, {high:+.2f}]**" in reading
