@@ -222,7 +222,7 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns as docs/results/data.md lists them.
+        Columns as ``columns.md`` beside every report lists them.
 
     Raises
     ------
