@@ -14,7 +14,7 @@ import torch
 from sphinx.application import Sphinx
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
-sys.path.insert(0, str(HERE))  # stages.py, formulas.py
+sys.path[:0] = [str(HERE), str(ROOT)]  # stages.py, formulas.py; tests.docs
 os.environ["COLUMNS"] = "100"  # of the tables that examples print
 SCRATCH = ROOT / "build" / "scratch"  # where examples write
 os.environ["XDG_CACHE_HOME"] = str(SCRATCH)
@@ -34,7 +34,7 @@ extensions = [
     "formulas",
 ]
 root_doc = "docs/start/index"
-include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/*/report.md", "reports/*/details.md"]
+include_patterns = ["CONTRIBUTING.md", "docs/**", "reports/**/report.md", "reports/**/details.md"]
 exclude_patterns = ["**/.*", "artifacts", "build", "methods", "datasets", "tests", "configs"]
 exclude_patterns += ["docs/gallery"]  # its pages are docs/examples, which the build writes
 
@@ -79,9 +79,17 @@ copybutton_exclude = ".linenos, .gp"
 
 
 def setup(app: Sphinx) -> None:
-    """Links to the code of an example lead to its page in the site."""
+    """Links to the code of an example lead to its page in the site; the page on displays has its tables there."""
     app.connect("source-read", _link_examples)
+    app.connect("source-read", _tables_of_displays)
 
 
 def _link_examples(_: Sphinx, __: str, source: list[str]) -> None:
     source[0] = re.sub(r"\((\.\./|docs/)gallery/(plot_\w+)\.py\)", r"(\1examples/\2.rst)", source[0])
+
+
+def _tables_of_displays(_: Sphinx, page: str, source: list[str]) -> None:
+    if page == "docs/displays":
+        from tests.docs.display_page import MARK, tables
+
+        source[0] = source[0].replace(MARK, tables())

@@ -23,7 +23,7 @@ from holobench_eval.display.simulated.stages import Panel
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.metrics import match, score
 from holobench_eval.optics import srgb_encode
-from holobench_eval.report.charts.style import new_figure, style
+from holobench_eval.report.charts.look import new_figure, style
 from holobench_eval.study.opening import open_bench
 
 PANEL, TARGET, STEPS = (192, 192), "astronaut", 100

@@ -222,16 +222,16 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns as docs/results/data.md lists them.
+        Columns as ``columns.md`` beside every report lists them.
 
     Raises
     ------
     UserError
         There is no such file, or it is damaged.
     """
-    from ..report.compare.paired import read_run
+    from ..report.compare import read_run
 
-    return read_run(path_of(folder, "folder")).records
+    return read_run(path_of(folder, "folder"))
 
 
 def _picture(light: Tensor) -> NDArray[np.float64]:

@@ -7,7 +7,6 @@ table.csv; report.md, the page, the site, the terminal and the tables of the doc
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..study.plan import is_reference
 from .columns import dictionary
 from .facts import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .latex import latex_tables
@@ -24,7 +24,7 @@ from .phrases import MARGINS, marks, verdict
 from .results import Results, csv_text, to_json
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
-from .text import number
+from .text import grouped, number
 
 # In the order of the board.
 GROUPS = {
@@ -34,6 +34,7 @@ GROUPS = {
     GIVEN: "Photographs that were given",
     ORACLE: "Knows the display: the best phase known",
 }
+SEVERAL = ", several frames in an exposure"
 VERSION = 2
 
 
@@ -152,18 +153,26 @@ def board(results: Results) -> Board:
     return Board(results, tuple(beside), tuple(_display(results, name, tuple(beside)) for name in results.conditions))
 
 
+def groups_of(results: Results) -> dict[str, str]:
+    """The group of each method, by its label, in the order of the board: who was given as much of the camera, and shows
+    as many frames in an exposure, which take as many times the panel's time."""
+    frames = results.frame.groupby("label")["frames"].max() if "frames" in results.frame else {}
+    several = {label: frames.get(label, 1) > 1 for label, name in results.cells if not is_reference(name)}
+    return {
+        label: f"{name}{SEVERAL * more}"
+        for category, name in GROUPS.items()
+        for more in (False, True)
+        for label in several
+        if results.category(label) == category and several[label] == more
+    }
+
+
 def _display(results: Results, condition: str, beside: tuple[Score, ...]) -> Display:
-    groups = []
-    for (category, name), several in itertools.product(GROUPS.items(), (False, True)):
-        labels = [
-            label
-            for label in results.methods(condition)
-            if results.category(label) == category and (results.rows[label, condition].get("frames", 1) > 1) == several
-        ]
-        if labels:
-            rows = tuple(_rows(results, condition, labels, beside))
-            groups.append((f"{name}{', several frames in an exposure' * several}", rows))
-    return Display(condition, tuple(groups), results.floor(condition))
+    here = results.methods(condition)
+    members = grouped((group, label) for label, group in groups_of(results).items() if label in here)
+    ordered = {group: sorted(labels, key=here.index) for group, labels in members.items()}
+    groups = tuple((group, tuple(_rows(results, condition, labels, beside))) for group, labels in ordered.items())
+    return Display(condition, groups, results.floor(condition))
 
 
 def _rows(results: Results, condition: str, labels: list[str], beside: tuple[Score, ...]) -> Iterator[Row]:

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import itertools
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..core.io import write_atomically
 from ..study.definition import Study
 from .board import texts
-from .charts.look.medium import MEDIA, drawn_for
+from .charts.look import MEDIA, drawn_for
+from .charts.tiles import draw_wall, spread
 from .description import Description, describe
 from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks
-from .page import write_page
-from .page.pictures import keep_copies
+from .page import keep_copies, write_page
 from .results import Results, of_study, read_records, records_frame, records_text
 from .stories import parts
+from .stories.overview import chosen
 from .story import Report
 
 # Figures that a report draws itself, those of pictures from thumbnails; the stages of a bench are drawn during the run.
 OF_PICTURES = ("answer-*.jpg", "comparison-*.jpg", "sweep-*.jpg")
 OF_NUMBERS = ("quality-*.png", "training-*.png")
 STAGES = "stages-*.png"
+SLIDE_TARGETS, SLIDE_METHODS = 3, 6
 
 
 def build_report(
@@ -101,10 +105,34 @@ def recompute_files(records_csv: str, facts: Facts) -> dict[str, str]:
 
 
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
-    """Draw the charts of a report for one of ``MEDIA`` into a folder, none of those made of pictures; every file."""
-    printed = replace(report, keeps_pictures=True, drawn=folder)
-    with drawn_for(MEDIA[medium]):
+    """Draw the charts of a report for one of ``MEDIA`` into a folder, and for a talk captures; every file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as drawn, drawn_for(MEDIA[medium]):
+        printed = replace(report, keeps_pictures=True, drawn=Path(drawn))
         for part in parts():
             if part.applies(printed):
-                for path, _ in part.figures(printed):
-                    yield from (path.with_suffix(suffix) for suffix in MEDIA[medium].suffixes)
+                list(part.figures(printed))
+        if MEDIA[medium].height:
+            _draw_slide(printed)
+        for path in sorted(Path(drawn).iterdir()):
+            yield Path(shutil.copy(path, folder))
+
+
+def _draw_slide(report: Report) -> None:
+    """The question, and captures on the first display that has some: of the worst, the middle and the best target of
+    those that have most, by the methods of the row of pictures."""
+    results, thumbnails = report.results, report.thumbnails
+    for condition in filter(results.has_pictures, results.conditions):
+        labels = sorted(chosen(results, condition), key=lambda label: label != results.baseline)[:SLIDE_METHODS]
+        pictures = thumbnails.targets(condition)
+        tiles = {
+            target: [(label, thumbnails.tile(label, condition, target, 1)) for label in labels]
+            for target in thumbnails.by_quality(condition)
+        }
+        counts = {target: sum(tile.picture is not None for _, tile in row) for target, row in tiles.items()}
+        if most := max(counts.values(), default=0):
+            targets = spread([target for target, count in counts.items() if count == most], SLIDE_TARGETS)
+            below = f"{condition}: {results.headline.axis}{results.text.axis}"
+            rows = {target: (pictures[target], tiles[target]) for target in targets}
+            draw_wall(report.figures / "slide.png", results.study.question or results.study.title, below, rows)
+            return

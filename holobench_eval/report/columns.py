@@ -55,7 +55,7 @@ clusters | count | | clusters | | Clusters of the targets with a score
 AFTER_SCORES = """
 captures | count | r | mean | captures per {each} | Captures that the method took while it solved the target, those
     of attempts that failed included // Captures while solving, mean over cells
-solving_s | number | r | median_alone | seconds per {each} | Time to solve the target, of the solving that made the
+solving_s | number | r | median_alone | | Time to solve the target, of the solving that made the
     phase, in this run or an earlier one // Time to solve a target, median over the cells timed alone, or over all;
     empty where it is more than 1.3 times that of the processors, as something else was at work
 frames | count | r? | mean | frames of a hologram | Frames of the hologram, which share one exposure

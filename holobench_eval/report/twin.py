@@ -21,7 +21,7 @@ from ..display.simulated.trust import MOST, Trust
 from ..metrics import match
 from ..study.calibration.twin import Photographed, trial_names
 from ..study.plan import Cell
-from .charts.look.methods import looks
+from .charts.look import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of

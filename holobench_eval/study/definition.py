@@ -32,8 +32,7 @@ STACKS = {"focus": "refocuses", "views": "has an eye's pupil"}
 class Learned:
     """A display that is the frozen network of a trained method (paper 6.3).
 
-    method: the method, by its registered name or as ``path/to/file.py:Name``; profile: the display whose captures it
-    is trained on; params: parameters of the method.
+    method: which one; profile: the display whose captures it is trained on; params: parameters of the method.
     """
 
     method: Text
@@ -75,8 +74,8 @@ class DisplayGrid:
 class Targets:
     """The images that are scored.
 
-    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset, whose paths start in the
-    working directory; only: some of its images (none: all).
+    dataset: which one; params: its parameters, whose paths start in the working directory; only: some of its images
+    (none: all).
     """
 
     dataset: Text
@@ -88,9 +87,9 @@ class Targets:
 class Training:
     """The images that methods may train on, never scored; equal for all methods of a study.
 
-    dataset: a registered name or ``path/to/file.py:Name``; params: parameters of the dataset;
-    held_out: how many of the last images are kept back to watch the training; captures: the most captures that a
-    method may take for its training, those of held-out images included (None: no limit).
+    dataset: which one; params: its parameters; held_out: how many of the last images are kept back to watch the
+    training; captures: the most that a method may take for its training, those of held-out images included (None: no
+    limit).
     """
 
     dataset: Text = "dead_leaves"
@@ -103,7 +102,7 @@ class Training:
 class Probe:
     """The method whose holograms are shown when predictions of captures are scored (paper Table 1).
 
-    name: a registered name or ``path/to/file.py:Name``; params: parameters of the method.
+    name: which one; params: its parameters.
     """
 
     name: Text = "wirtinger"
@@ -141,12 +140,11 @@ class Sweep:
 class MethodEntry:
     """A method of a study.
 
-    name: a registered name or ``path/to/file.py:Name``; label: its name in tables (without one: its name, or that of
-    its class); params: parameters of the method, its defaults for others; grid: lists of values of further parameters,
-    for a row with each combination, whose values end its label; profiles: the displays it is shown
-    on, a subset of the study's; captures: the most that the display allows a method with a camera for one target (None:
-    no limit); exposure: of its scored captures (None: that of the study's displays); row: its place in the config, from
-    0.
+    name: which one; label: its name in tables (empty: its name, or that of its
+    class); params: parameters of the method; grid: lists of values of further parameters, for a row with each
+    combination; profiles: the displays it is shown on, a subset of the study's; captures: the most that the display
+    allows a method with a camera for one target (None: no limit); exposure: of its scored captures (None: that of the
+    display); row: its place in the config, from 0.
     """
 
     name: Text
@@ -172,9 +170,9 @@ class MethodEntry:
 class Protocol:
     """How captures are scored.
 
-    version: of the metric protocol; metrics: names of the metrics to compute (None: all, 10 s for a capture of
-    1080 x 1920 pixels), and for predictions ``control``, which takes four more captures of each target and is computed
-    only where it is named; lpips_weights: a file or folder of LPIPS trunk weights (None: torch's hub cache).
+    version: of the metric protocol; metrics: names of the metrics to compute (None: all but ``control``, which is one
+    of predictions and takes four more captures of each target); lpips_weights: a file or folder of LPIPS trunk weights
+    (None: torch's hub cache).
     """
 
     version: Literal["v2"] = "v2"
@@ -186,9 +184,9 @@ class Protocol:
 class Save:
     """What else is written beside the scores.
 
-    kept: every registered capture, exact, in the folder of records, so that ``holoeval rescore`` can fill the column of
-    another metric; captures: every registered capture (PNG, 16 bit), in a folder beside the report, by name; phases:
-    every hologram's phase there (PNG of 8 bits, and exact as .npy, which the method ``phases`` reads).
+    kept: registered captures, exact, among the records, for ``holoeval rescore``; captures: the same as PNG of 16 bits,
+    in a folder beside the report, by name; phases: holograms there (PNG of 8 bits, and exact as .npy, which the method
+    ``phases`` reads).
     """
 
     kept: bool = True
@@ -226,23 +224,21 @@ class Study:
 
     title: heads the report; display: what shows the holograms; targets: the images that are scored; methods: what is
     compared, each a name or a mapping, in the order of the tables.
-    measure: ``picture`` scores captures against targets; ``prediction`` scores what trained methods predict of captures
-    of the holograms' method; ``error_budget`` also splits the error of these captures by what the methods, in the order
-    of the config, explain of it; ``focus`` scores the planes of focal stacks, each at its own distance, and ``views``
-    light fields, each view from its place. holograms: for predictions, the method whose holograms are captured;
-    training: the images that methods may train on, the same for all; sweeps: changes of the displays at test time.
+    measure: ``picture`` scores captures; ``prediction`` what trained methods predict of captures; ``error_budget`` also
+    splits the error of these captures by method; ``focus`` scores the planes of focal stacks, ``views`` the views of
+    light fields. holograms: for predictions, the method whose holograms are captured; training: the images that methods
+    may train on; sweeps: changes of the displays at test time.
     question: what the report answers first, for the methods whose labels it names; would_change: which result would
-    change the answer; note: a paragraph that the report prints among the limits of its answer.
-    seed: of all random numbers; repeats: how often every cell is measured, with new noise; timing: ``shared`` takes a
-    solution's seconds beside other workers, ``alone`` those of one solution a row with nothing beside it; protocol: how
-    captures are scored; baseline: label that paired tests compare against (empty: that of the first method);
-    headline: the column that the report leads with, a metric and a domain; save: what else is written beside the
-    scores.
+    change the answer; note: a paragraph among the limits of the answer.
+    seed: of all random numbers; repeats: how often every cell is measured, with new noise; timing: ``shared`` takes
+    seconds beside other workers, ``alone`` those of one solution a row with nothing beside it; protocol: how captures
+    are scored; baseline: label that paired tests compare against (empty: the first method's); headline: the column that
+    the report leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; related: names of error budgets and predictions of the same
     displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them;
-    board: whether the study enters the pages of displays on a site.
+    board: whether its cards come first on a site.
     file, text: the config file as the user named it, and what is in it; changes: those of the command line.
     """
 

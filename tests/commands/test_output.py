@@ -12,7 +12,7 @@ from rich.text import Text
 from holobench_eval.commands import _plain
 from holobench_eval.commands.output import MOST_REASONS, console, print_answer, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.answers import kind_of
+from holobench_eval.report.stories import answer
 from tests.support.synthetic_study import cell, layout, record, study
 
 LONG = "a method whose label is as long as a label may ever be, sixty"
@@ -56,7 +56,7 @@ def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(records, enco
 def test_the_answer_of_the_report_stands_below_the_tables(records):
     results, file = found(records), io.StringIO()
     print_answer(Console(file=file, width=80), results)
-    assert " ".join(file.getvalue().split()) == " ".join(f"- {line}" for line in kind_of(results).answer(results))
+    assert " ".join(file.getvalue().split()) == " ".join(f"- {line}" for line in answer(results))
 
 
 def test_methods_stand_in_their_groups_with_letter_photographs_or_the_targets_that_they_have(records):

@@ -16,8 +16,7 @@ from holobench_eval.core.hashing import digest
 from holobench_eval.lab.real import RealBench
 from holobench_eval.lab.session import read_manifest
 from holobench_eval.metrics import catalogue
-from holobench_eval.report import build_report
-from holobench_eval.report.data import scores
+from holobench_eval.report import build_report, scores
 from holobench_eval.study import executors, identity
 from holobench_eval.study.config import load_study
 from holobench_eval.study.identity import parted

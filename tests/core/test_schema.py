@@ -23,7 +23,7 @@ from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.profile import Profile
 from holobench_eval.interactive import load_records
 from holobench_eval.lab.bench_file import BenchFile, load_bench_file
-from holobench_eval.report.compare.paired import read_run
+from holobench_eval.report.compare import read_run
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.definition import Study

@@ -1,27 +1,31 @@
-"""``docs/displays.md`` from the schema of displays: ``python -m tests.docs.display_page`` writes it."""
+"""The keys of a display as tables, from the schema of displays.
+
+The site puts them where ``docs/displays.md`` has ``MARK``.
+"""
 
 from pathlib import Path
 
 from holobench_eval.core.parameters import json_schemas, resolved
 from holobench_eval.display.simulated.maps import KEYS
 from holobench_eval.display.simulated.profile import STAGES, Profile
-from tests.docs.sections import introduction, mappings, section
+from tests.docs.sections import mappings, section
 
 PAGE = Path(__file__).parents[2] / "docs" / "displays.md"
+MARK = "<!-- On the site the tables of all keys stand here. -->"
 
 
-def page() -> str:
-    """The text of the page: what stands above the mark, and the tables."""
+def tables() -> str:
+    """A section a mapping of the file: title, model of the stage and table."""
     schemas, definitions = json_schemas({"display": Profile})
     schema = resolved(schemas["display"], definitions)
     for name, stage in STAGES.items():
         if name in schema["properties"] and name != "panel":
             schema["properties"][name]["description"] = stage.title
-    parts = [introduction(PAGE, "display_page"), *section("The document", schema, definitions, units=True)]
+    parts = list(section("The document", schema, definitions, units=True))
     for key, entry in schema["properties"].items():
         for name, inner in mappings(key, entry, definitions):
             parts += section(f"`{name}`", inner, definitions, _note(key), units=True)
-    return "\n".join(parts).rstrip("\n") + "\n"
+    return "\n".join(parts)
 
 
 def _note(key: str) -> str:
@@ -40,6 +44,3 @@ def _note(key: str) -> str:
 
 NOTE = """A file of float32 arrays beside the YAML, each optional ([measured maps](#measured-maps)). `rows` and
 `columns` are those of the panel, or fewer, which are enlarged bicubically with corners on corners."""
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")

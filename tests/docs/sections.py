@@ -3,18 +3,11 @@
 import json
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from holobench_eval.core.parameters import allowed, resolved
 
 LONGEST = 5  # names that a cell lists; of more, holoeval list has them
-
-
-def introduction(page: Path, module: str) -> str:
-    """What stands on a page above the line that says which module writes the rest, and the line."""
-    mark = f"<!-- What follows is written by: python -m tests.docs.{module} -->\n"
-    return page.read_text(encoding="utf-8").partition(mark)[0] + mark
 
 
 def mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]]:
@@ -35,22 +28,22 @@ def mappings(key: str, entry: Any, definitions: Any) -> Iterator[tuple[str, Any]
 
 def section(title: str, schema: Any, definitions: Any, note: str = "", units: bool = False) -> Iterator[str]:
     """The lines of a mapping: title, note and table. units: they stand in brackets in the texts, and get a column."""
-    head = ["key", *["unit"] * units, "may be", "default", "what it is"]
+    head = ["key", *["unit"] * units, "may be (default)", "what it is"]
     yield "\n\n".join([f"## {title}", *[note] * bool(note), f"| {' | '.join(head)} |"]) + f"\n|{'---|' * len(head)}"
     needed = schema.get("required", ())
     for name, entry in schema["properties"].items():
         inside = any(True for _ in mappings(name, entry, definitions))
-        default = "needed" if name in needed else "below" if inside and entry.get("default") else _default(entry)
+        default = ", needed" if name in needed else "" if inside and entry.get("default") else _default(entry)
         text = entry["description"].replace("None: ", "null: ").replace("|", "\\|")
         unit = re.search(r" ?\[([^\]]+)\]", text) if units else None
         text = text.replace(unit[0], "", 1).strip() if unit else text
-        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, allowed(_short(entry), definitions), default, text]
+        cells = [f"`{name}`", *[unit[1] if unit else ""] * units, allowed(_short(entry), definitions) + default, text]
         yield f"| {' | '.join(cells)} |".replace("  ", " ")
     yield ""
 
 
 def _default(entry: Any) -> str:
-    return f"`{json.dumps(entry['default'])}`" if entry.get("default", "") not in ("", [], {}) else ""
+    return f" (`{json.dumps(entry['default'])}`)" if entry.get("default", "") not in ("", [], {}, None) else ""
 
 
 def _short(entry: Any) -> Any:
@@ -60,7 +53,7 @@ def _short(entry: Any) -> Any:
     if not isinstance(entry, dict):
         return entry
     if len(entry.get("enum", ())) > LONGEST:
-        return {"type": "a name of `holoeval list`"}
+        return {"type": "name"}
     if "pattern" in entry:
-        return {"type": "`path/to/file.py:Name`" if "py" in entry["pattern"] else "`path/to/file.yaml`"}
+        return {"type": "`file.py:Name`" if "py" in entry["pattern"] else "`file.yaml`"}
     return {key: _short(part) for key, part in entry.items()}

@@ -22,9 +22,8 @@ from holobench_eval.lab.real import RealSession
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.report.facts import layout_of
-from holobench_eval.report.results import Results
-from holobench_eval.report.results import records_frame
 from holobench_eval.report.files import write_files
+from holobench_eval.report.results import Results, records_frame
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
 from holobench_eval.study.executors.clusters import Address

@@ -22,7 +22,7 @@ from holobench_eval.lab.raw import read_raw
 from holobench_eval.lab.session.manifest import FILE as MANIFEST
 from holobench_eval.lab.session.manifest import capture_of, file_of, read_manifest
 from holobench_eval.methods.files.arrays import read_array
-from holobench_eval.report.compare.paired import records_of
+from holobench_eval.report.compare import read_run
 from holobench_eval.study.artifacts import read_tensors
 from holobench_eval.study.config import load_study
 from holobench_eval.study.isolation.messages import Channel
@@ -193,5 +193,5 @@ TARGETS = {
             b'["dict", ["ask", "capture"], ["args", ["tuple", ["class", "Capture", ["dict", ["dark", 0.5]]]]]]',
         ],
     ),
-    "records.csv": Target(lambda content, folder: records_of(folder, content.decode("utf-8", "replace")), _csv),
+    "records.csv": Target(lambda content, folder: read_run(_file(folder, "records.csv", content).parent), _csv),
 }

@@ -8,7 +8,7 @@ import torch
 
 from holobench_eval import metrics
 from holobench_eval.metrics import catalogue, score
-from holobench_eval.report.data import scores
+from holobench_eval.report import scores
 
 FILE = '''
 """Largest error of a pixel."""

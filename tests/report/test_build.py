@@ -7,9 +7,9 @@ from skimage.io import imread
 
 from holobench_eval.report import Results, records_frame, write_report
 from holobench_eval.report.build import print_figures
-from holobench_eval.report.charts.look.medium import MEDIA
+from holobench_eval.report.charts.look import MEDIA
 from holobench_eval.report.description import Description, Display
-from holobench_eval.report.section import Report
+from holobench_eval.report.story import Report
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic
 from tests.support.reports import files, whole
@@ -176,6 +176,8 @@ def test_figures_are_as_wide_as_their_medium_in_text_that_can_be_read(prints, me
         assert "<dc:date>" not in text
         width = float(re.search(r'width="([\d.]+)pt"', text).group(1)) / 72 * 25.4
         assert width == pytest.approx(millimetres, abs=0.3)
+        height = float(re.search(r'height="([\d.]+)pt"', text).group(1)) / 72 * 25.4
+        assert medium != "talk" or height == pytest.approx(millimetres * 9 / 16, abs=0.3)
     for path in (path for path in prints if path.parent.name == medium and path.suffix == ".pdf"):
         content = path.read_bytes()
         assert b"/FontFile2" in content, path.name  # TrueType and not outlines of letters

@@ -14,7 +14,7 @@ from holobench_eval.report.facts import Swept
 from holobench_eval.report.results import of_study
 from holobench_eval.study.config import load_study
 from holobench_eval.study.plan import REFERENCE
-from tests.report.sections import test_sweeps as swept_study
+from tests.report.stories import test_sweeps as swept_study
 from tests.support import synthetic_study as synthetic
 
 ROOT = Path(__file__).parents[2]

@@ -5,13 +5,10 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
-from holobench_eval.report import Results, facts_of, read_records, records_frame
-from holobench_eval.report.board import texts
+from holobench_eval.report import Results, records_frame
 from holobench_eval.report.latex import escape, latex_tables
-from holobench_eval.study.config import load_study
 from tests.support import synthetic_study as synthetic
 from tests.support.budget_study import ROWS, TARGETS, facts, study
 
@@ -124,36 +121,3 @@ def test_the_tables_compile_and_fit_one_column(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout[-2000:]
     assert "Overfull" not in done.stdout
     assert (tmp_path / "paper.pdf").stat().st_size > 1000
-
-
-ROOT = Path(__file__).parents[2]
-EXAMPLES = re.findall(
-    r"<!-- pandas -->\n```python\n(.*?)```", (ROOT / "docs" / "results" / "data.md").read_text(), re.DOTALL
-)
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The files of the leaderboard, written from its committed records, in the working folder."""
-    report = tmp_path / "reports" / "leaderboard"
-    report.mkdir(parents=True)
-    records = read_records((ROOT / "reports" / "leaderboard" / "records.csv").read_text())
-    for name, text in texts(Results(records, facts_of(load_study(ROOT / "configs" / "leaderboard.yaml")))).items():
-        (report / name).write_text(text)
-    monkeypatch.chdir(tmp_path)
-    return report
-
-
-def test_the_examples_print_differences_and_tests(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    printed = []
-    for example in EXAMPLES:
-        assert len([line for line in example.splitlines() if line and not line.startswith("import")]) <= 3
-        exec(example, {})
-        printed.append(capsys.readouterr().out)
-    differences, every = printed
-    tests = pd.read_csv(folder / "tests.csv").query("label == 'hil'").set_index("condition")
-    assert len(tests) > 1
-    for condition, difference in tests["difference_db"].items():
-        (value,) = re.findall(rf"^{condition}\s+(\S+)$", differences, re.MULTILINE)
-        assert float(value) == pytest.approx(difference, abs=2e-5)
-    assert [line.split()[1] for line in every.splitlines() if re.match(r"\d", line)] == tests.index.tolist()

@@ -1,5 +1,6 @@
 """A small made-up study: photographs degraded like captures, with scores, as record dicts and thumbnails."""
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from skimage.metrics import structural_similarity
 
 from holobench_eval.core.hashing import digest
 from holobench_eval.report import Facts, Results, records_frame
-from holobench_eval.study.plan import FLOORS, REFERENCE, is_reference
+from holobench_eval.study.plan import FLOORS, REFERENCE, is_reference, reference_of
 from holobench_eval.study.store import Store
 from tests.support import made_facts
 
@@ -30,6 +31,8 @@ DISTORTION = {  # speckle contrast, blur [px], undiffracted light
 SECONDS = {"Double phase": 0.02, "GS": 1.5, "Wirtinger": 9.0, "SGD": 8.0, "HIL": 11.0, "Oracle": 30.0}
 NAMES = dict(zip(DISTORTION, ("double_phase", "gerchberg_saxton", "wirtinger", "sgd", "hil", "oracle"), strict=True))
 SEVERITY = {"leto-aged": 1.0, "ideal": 0.5}
+EIGHT = tuple(f"t{index}" for index in range(8))
+NOISE = np.array([0.0, 0.3, -0.2, 0.1, 0.4, -0.1, 0.2, -0.3])
 TARGETS = ("astronaut", "chelsea", "coffee", "rocket", "retina", "camera")
 
 
@@ -155,6 +158,30 @@ def results(records: list[Record], **changes: Any) -> Results:
     given = {"pairs": tuple(pairs), "targets": tuple(targets), "privileged": frozenset(), "reported": {}}
     made = facts(**(given | changes))
     return Results(records_frame(records, made), made)
+
+
+def results_of(
+    means: dict[str, float],
+    names: dict[str, str] | None = None,
+    captures: dict[str, int] | None = None,
+    noise: Callable[[str], np.ndarray] = lambda label: NOISE,
+    **changes: Any,
+) -> Results:
+    """A study of one display, or of the display after ``@`` in a label; names: registered; captures: per target."""
+    records, pairs = [], []
+    for key, mean in means.items():
+        label, _, display = key.partition("@")
+        condition = display or "bench"
+        if label.startswith("floor_"):
+            condition = reference_of(display) if display else REFERENCE
+        if not is_reference(condition):
+            pairs.append((label, condition))
+        for target, value in zip(EIGHT, mean + noise(label), strict=True):
+            described = cell((names or {}).get(label, label), target, condition, params={"label": label})
+            taken = (captures or {}).get(label, 0)
+            records.append(record(label, described, {"psnr_linear": float(value)}, captures=taken))
+    given = {"pairs": tuple(pairs), "targets": EIGHT, "baseline": "old", "privileged": frozenset({"oracle"})}
+    return results(records, **(given | changes))
 
 
 def save_picture(path: Path, linear: Image) -> None:

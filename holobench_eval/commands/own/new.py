@@ -23,7 +23,7 @@ STARTS_AS = "ideal"  # whose panel the file has until it is changed
 FIRST = "sampling"  # of the keys that a display may leave out
 HEAD = """\
 # A display of your own. It starts with the panel of '{base}': put in the values of your data sheet, lengths in metres,
-# and take the '#' off what else your display has. docs/displays.md has the same keys as tables.
+# and take the '#' off what else your display has. docs/displays.md says more of displays.
 #     holoeval list {file}       what it says
 #     holoeval show {file}       what it does to a hologram, stage by stage
 # In a study: display: {{profiles: [{file}], panel: [256, 256]}}

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from ...core.errors import UserError
 from ..output import console as open_console
-
-if TYPE_CHECKING:
-    from ...report.compare.page import Part
 
 
 def compare(
@@ -40,26 +36,31 @@ def compare(
 ) -> None:
     """Compare two reports cell by cell: of two commits, two benches, or a simulated and a real one."""
     from ...core.io import write_atomically
-    from ...report.compare import page
-    from ...report.compare.paired import compare as pair
-    from ...report.compare.paired import read_run
+    from ...report.compare import compare as pair
 
     console = open_console()
-    comparison = pair(read_run(a), read_run(b), metric, _pairs(displays))
-    for part in page.parts(comparison):
-        _print(console, part)
+    comparison = pair(a, b, metric, _pairs(displays))
+    for title, sentence, rows in comparison.parts:
+        console.print(f"\n{title}. {sentence}", markup=False, soft_wrap=True)
+        if len(rows):
+            table = Table(*map(escape, map(str, rows)))
+            for row in rows.itertuples(index=False):
+                table.add_row(*map(escape, row))
+            console.print(table)
     if output is not None:
-        for name, text in (("compare.md", page.markdown(comparison)), ("compare.csv", page.csv(comparison))):
+        for name, text in (("compare.md", comparison.markdown), ("compare.csv", comparison.csv)):
             write_atomically(output / name, text.encode())
             console.print(str(output / name), markup=False, soft_wrap=True)
     if fail_on_regression is not None:
-        limit = f"{fail_on_regression:g} {comparison.score.unit}".rstrip()
-        worse = [f"{row.method} on {row.display}" for row in comparison.regressions(fail_on_regression)]
-        lost = [f"{part.method} on {part.display}" for part in comparison.unpaired if part.run == "A"]
-        for what, named in ((f"worse by more than {limit}", worse), ("without scores that A has", lost)):
-            if named:
-                console.print(f"{what}: {'; '.join(named)}", markup=False, soft_wrap=True)
-        if worse or lost:
+        limit = f"{fail_on_regression:g} {comparison.rows['unit'][0]}".rstrip()
+        rows = comparison.rows
+        worse = rows[(rows["verdict"] == "worse") & (rows["difference"].abs() > fail_on_regression)]
+        lost = comparison.unpaired[comparison.unpaired["run"] == "A"]
+        for what, rows in ((f"worse by more than {limit}", worse), ("without scores that A has", lost)):
+            if len(rows):
+                named = "; ".join(rows["method"] + " on " + rows["display"])
+                console.print(f"{what}: {named}", markup=False, soft_wrap=True)
+        if len(worse) or len(lost):
             raise typer.Exit(1)
 
 
@@ -74,12 +75,3 @@ def _pairs(displays: Sequence[str] | None) -> dict[str, str] | None:
             raise UserError(f"--displays {text}: '{first}' is paired already; expected each display once")
         pairs[first] = second
     return pairs or None
-
-
-def _print(console: Console, part: Part) -> None:
-    console.print(f"\n{part.title}. {part.sentence}", markup=False, soft_wrap=True)
-    if part.rows:
-        table = Table(*map(escape, part.rows[0]))
-        for row in part.rows:
-            table.add_row(*map(escape, row.values()))
-        console.print(table)

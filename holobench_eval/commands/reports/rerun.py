@@ -91,11 +91,11 @@ def rerun(report: Path, study: Study, count: int, seed: int, artifacts: Path, wh
     UserError
         records.csv or an artifact is damaged.
     """
-    from ...report.compare.paired import read_run
+    from ...report.compare import read_run
     from ...report.results import DONE, score_columns
     from ...study.plan import plan as plan_cells
 
-    records, plan = read_run(report).records, plan_cells(study)
+    records, plan = read_run(report), plan_cells(study)
     rows, verdict = _by_key(records), Verdict()
     tasks = [task for task in plan.tasks for _ in task.cells]
     keys = [(label, cell.condition, cell.target, cell.repeat) for label, cell in plan.labelled()]
@@ -142,7 +142,7 @@ def sample(cells: Sequence[Planned], count: int, seed: int) -> list[Planned]:
 
 
 def _by_key(records: pd.DataFrame) -> dict[Any, dict[Any, Any]]:
-    from ...report.compare.paired import CELL
+    from ...report.compare import CELL
 
     return records.set_index(list(CELL), drop=False).to_dict("index")
 

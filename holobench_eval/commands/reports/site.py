@@ -1,4 +1,4 @@
-"""``holoeval site``: many reports as one static site with a leaderboard."""
+"""``holoeval site``: many reports as one page of cards."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def site(
         list[Path] | None,
         typer.Argument(metavar="DIR...", help="Reports, or folders of reports. [default: reports]"),
     ] = None,
-    output: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the site is written.")] = Path("site"),
+    output: Annotated[Path, typer.Option(metavar="FOLDER", help="Where index.html is written.")] = Path("site"),
 ) -> None:
-    """Write a static site over many reports: a leaderboard, and a page a method, a display and a study."""
+    """Write one page over many reports: a card for each display of each study, with the best rows."""
     from ...report.site import write_site
 
     count, without = write_site(folders or [Path("reports")], output)

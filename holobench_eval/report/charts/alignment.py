@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...imaging.warp import Warp
-from .style import save_picture
+from .look import save_picture
 
 HEIGHT = 480  # pixels
 SQUARES = 8

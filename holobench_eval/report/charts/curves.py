@@ -17,14 +17,11 @@ from ...study.artifacts import Round
 from ..board import Display, Row
 from ..facts import ORACLE
 from ..results import Results
-from .look.medium import medium
-from .look.methods import Look, looks
-from .style import GREY, SHADES, grid, laid_out, legend_below, marks, save, stacked, style, without_math
+from .look import GREY, SHADES, Look, chart, grid, legend_below, legend_beside, looks, medium, stacked
 
 TICKS = (0, 5, *(step * 10**power for power in range(1, 7) for step in (1, 2, 5)))
 COSTS, SWEEP, LINE, FOOTER = 320, 330, 17, 10  # pixels of the screen: of a panel of either, of a name beside it
 Rounds = tuple[str, tuple[Round, ...]]  # a training's name and its rounds
-Limits = tuple[tuple[float, float], tuple[float, float]]  # of captures, and of PSNR [dB]
 
 COLUMNS, A_PAGE, NARROWEST = 3, 6, 200  # of trainings: panels side by side and on a page, pixels of a panel
 MOST = 12  # trainings with a panel each; of more, the table alone is in the report
@@ -43,15 +40,13 @@ def draw_costs(
     names: the registered name of every label, whose rows are joined; looked: by label; quality: the headline with its
     unit.
     """
-    with style():
-        rows = [_rows(display) for display in displays]
-        heights = [max(COSTS, LINE * len(each) + 60) for each in rows]
-        figure, drawn = stacked([display.name for display in displays], heights, FOOTER)
-        for axes, each in zip(drawn, rows, strict=True):
-            _draw_costs(axes, each, names, looked)
-            _finish(axes, quality)
-        axes.set_xlabel("photographs in total, of training and of all targets")
-        save(figure, path)
+    rows = [_rows(display) for display in displays]
+    heights = [max(COSTS, LINE * len(each) + 60) for each in rows]
+    label = "photographs in total, of training and of all targets"
+    panels = stacked(path, [display.name for display in displays], heights, FOOTER, label)
+    for axes, each in zip(panels, rows, strict=True):
+        _draw_costs(axes, each, names, looked)
+        _finish(axes, quality)
 
 
 def draw_sweep(path: Path, results: Results, points: pd.DataFrame, quality: str) -> None:
@@ -59,20 +54,18 @@ def draw_sweep(path: Path, results: Results, points: pd.DataFrame, quality: str)
 
     points: of one kind, with their display, method, value and its text, condition and loss.
     """
-    with style():
-        panels = dict(iter(points.groupby("display", sort=False)))
-        figure, drawn = stacked([str(name) for name in panels], [SWEEP] * len(panels), FOOTER)
-        for axes, each in zip(drawn, panels.values(), strict=True):
-            _draw_sweep(axes, results, each)
-            _finish(axes, quality)
-        save(figure, path)
+    displays = {str(name): each for name, each in points.groupby("display", sort=False)}
+    panels = stacked(path, list(displays), [SWEEP] * len(displays), FOOTER)
+    for axes, each in zip(panels, displays.values(), strict=True):
+        _draw_sweep(axes, results, each)
+        _finish(axes, quality)
 
 
 def _finish(axes: Axes, quality: str) -> None:
-    """The names of what is drawn, in rows to the right of the panel, and of the axis."""
+    """The names of what is drawn, and of the axis."""
     axes.set_ylabel(quality.replace(", of ", "\nof "))
     grid(axes)
-    without_math(axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=medium().note))
+    legend_beside(axes)
 
 
 def _rows(display: Display) -> list[Row]:
@@ -94,7 +87,7 @@ def _draw_costs(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looke
                 row.photographs or 0.0,
                 row.score.mean,
                 yerr=row.test.estimate.reach if row.test and known else None,
-                **marks(look, 6.5),
+                **look.marks(6.5),
                 linestyle="none",
                 ecolor=look.colour,
                 capsize=2.5,
@@ -110,7 +103,8 @@ def _draw_costs(axes: Axes, rows: Sequence[Row], names: Mapping[str, str], looke
 
 def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
     """Means, slightly apart from each other, with bars for their differences to the unchanged display."""
-    kind, curves = KINDS[points["kind"].iloc[0]], dict(iter(points.groupby("method", sort=False)))
+    kind = KINDS[points["kind"].iloc[0]]
+    curves = {str(label): curve for label, curve in points.groupby("method", sort=False)}
     places = points.drop_duplicates("text")
     looked, better = looks(results.names), results.headline.sign
     positions = places["value"].to_numpy(np.float64) if kind.numeric else np.arange(len(places))
@@ -118,10 +112,10 @@ def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
     for index, (label, curve) in enumerate(curves.items()):
         axes.errorbar(
             positions + (index - (len(curves) - 1) / 2) * apart,
-            [results.values(label, name).mean() for name in curve["condition"]],
+            [results.values(label, str(name)).mean() for name in curve["condition"]],
             yerr=np.hstack([loss.reach[::-better] if loss else np.zeros((2, 1)) for loss in curve["loss"]]),
             color=looked[label].colour,
-            **marks(looked[label], 6.5),
+            **looked[label].marks(6.5),
             linewidth=1.5 if kind.numeric else 0,
             linestyle="--" if label == results.baseline else "-",
             elinewidth=0.8,
@@ -141,15 +135,23 @@ def _draw_sweep(axes: Axes, results: Results, points: pd.DataFrame) -> None:
 def draw_trainings(stem: Path, trainings: Sequence[Rounds]) -> list[Path]:
     """Draw the trainings that have several rounds, where they are few enough to be looked at; the files.
 
-    stem: the files' name without number and ending.
+    stem: the files' name without number and ending. All panels have one range, so that they can be compared by eye.
     """
     drawable = [(name, kept) for name, rounds in trainings if (kept := tuple(filter(_has_figures, rounds)))]
     if len(drawable) > MOST or all(len(rounds) == 1 for _, rounds in drawable):
         return []
-    drawn = []
-    for number, start in enumerate(range(0, len(drawable), A_PAGE), start=1):
-        drawn.append(stem.with_name(f"{stem.name}-{number}.png"))
-        _draw_page(drawn[-1], drawable[start : start + A_PAGE], _limits(drawable))
+    steps = [step for _, rounds in drawable for step in rounds]
+    values = np.array([getattr(step, name) for step in steps for name, *_ in LINES])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = max(0.5, 0.08 * (high - low))
+    limits = {
+        "xlim": (0.0, max(step.captures for step in steps) * 1.06 + 0.5),
+        "ylim": (low - margin, high + margin),
+    }
+    pages = range(0, len(drawable), A_PAGE)
+    drawn = [stem.with_name(f"{stem.name}-{number}.png") for number in range(1, len(pages) + 1)]
+    for path, start in zip(drawn, pages, strict=True):
+        _draw_page(path, drawable[start : start + A_PAGE], limits)
     return drawn
 
 
@@ -157,46 +159,23 @@ def _has_figures(step: Round) -> bool:
     return math.isfinite(step.captures) and any(math.isfinite(getattr(step, name)) for name, *_ in LINES)
 
 
-def _limits(trainings: Sequence[Rounds]) -> Limits:
-    """The ranges of captures and of PSNR, one for all panels, so that they can be compared by eye."""
-    values = np.array([getattr(step, name) for _, rounds in trainings for step in rounds for name, *_ in LINES])
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    margin = max(0.5, 0.08 * (high - low))
-    most = max(step.captures for _, rounds in trainings for step in rounds)
-    return (0.0, most * 1.06 + 0.5), (low - margin, high + margin)
-
-
-def _draw_page(path: Path, trainings: Sequence[Rounds], limits: Limits) -> None:
+def _draw_page(path: Path, trainings: Sequence[Rounds], limits: Mapping[str, tuple[float, float]]) -> None:
     """A panel per training: the three figures against the captures taken, a mark per round."""
     columns = min(COLUMNS, len(trainings), medium().width // NARROWEST)
     rows = -(-len(trainings) // columns)
-    with style():
-        height = round(medium().scale * (60 + 270 * rows))
-        figure, panels = laid_out(medium().width, height, rows, columns, sharey=True)
-        for index, axes in enumerate(panels.flat):
-            if index >= len(trainings):
-                axes.remove()
-                continue
-            name, steps = trainings[index]
-            _curve(axes, steps, limits)
-            title = textwrap.fill(
-                name,
-                medium().characters(0.85 * medium().width / columns),
-                max_lines=2,
-                placeholder="...",
-                break_on_hyphens=False,
-            )
+    letters = medium().characters(0.85 * medium().width / columns)
+    with chart(path, 60 + 270 * rows, rows, columns, sharey=True) as (figure, panels):
+        for axes in panels.flat[len(trainings) :]:
+            axes.remove()
+        for axes, (name, steps) in zip(panels.flat, trainings, strict=False):
+            captures = [step.captures for step in steps]
+            for key, label, colour, marker in LINES:
+                axes.plot(captures, [getattr(step, key) for step in steps], color=colour, marker=marker, label=label)
+            axes.set(xlabel="captures taken for training", **limits)
+            axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+            grid(axes)
+            title = textwrap.fill(name, letters, max_lines=2, placeholder="...", break_on_hyphens=False)
             axes.set_title(title, loc="left", weight="bold", parse_math=False)
-            if index % columns == 0:
-                axes.set_ylabel("PSNR on held-out images [dB]")
+        for axes in panels[:, 0]:
+            axes.set_ylabel(medium().wrap("PSNR on held-out images [dB]", 75 * figure.get_figheight() / rows))
         legend_below(figure, *panels[0, 0].get_legend_handles_labels())
-        save(figure, path)
-
-
-def _curve(axes: Axes, rounds: tuple[Round, ...], limits: Limits) -> None:
-    captures = [step.captures for step in rounds]
-    for key, label, colour, marker in LINES:
-        axes.plot(captures, [getattr(step, key) for step in rounds], color=colour, marker=marker, label=label)
-    axes.set(xlabel="captures taken for training", xlim=limits[0], ylim=limits[1])
-    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
-    grid(axes)

@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
-from .look.medium import medium
-from .style import PALE, grid, laid_out, legend_below, note, save, style
+from .look import PALE, chart, grid, legend_below, medium, note
 
 ROW, HEADER, LEGEND = 110, 40, 110  # pixels: of a display, above and below all
 SHARES, GAINS = 0.6, 0.4  # of the width
@@ -26,11 +25,10 @@ DARKEST, LIGHTEST = 0.1, 0.9  # of the part of it that is used
 def draw_budgets(path: Path, budgets: Sequence[Any]) -> None:
     """Draw the budgets of displays, see ``stories.error_budget.Budget``."""
     colours = _colours(budgets)
-    with style():
-        narrow = medium().narrow
-        height = round(medium().scale * (HEADER + ROW * len(budgets) + LEGEND) * (1 + narrow))
-        shape, ratios = ((2, 1), None) if narrow else ((1, 2), [SHARES, GAINS])
-        figure, panels = laid_out(medium().width, height, *shape, sharey=True, width_ratios=ratios)
+    narrow = medium().narrow
+    shape = {"rows": 2} if narrow else {"columns": 2, "width_ratios": [SHARES, GAINS]}
+    height = (HEADER + ROW * len(budgets) + LEGEND) * (1 + narrow)
+    with chart(path, height, sharey=True, **shape) as (figure, panels):
         left, right = panels.flat
         for row, budget in enumerate(budgets):
             _shares(left, row, budget, colours)
@@ -48,9 +46,7 @@ def draw_budgets(path: Path, budgets: Sequence[Any]) -> None:
         for axes in (left, right):
             axes.tick_params(axis="y", length=0)
             grid(axes, "x")
-        handles = [Patch(facecolor=colour) for colour in colours.values()]
-        legend_below(figure, handles, list(colours))
-        save(figure, path)
+        legend_below(figure, [Patch(facecolor=colour) for colour in colours.values()], list(colours))
 
 
 def _colours(budgets: Sequence[Any]) -> Mapping[str, str]:
@@ -79,7 +75,7 @@ def _shares(axes: Axes, row: int, budget: Any, colours: Mapping[str, str]) -> No
 
 def _gains(axes: Axes, row: int, budget: Any, colours: Mapping[str, str]) -> None:
     """A mark with its interval for each link of the chain, from above to below, and one for the noise alone."""
-    links = [*budget.explained, budget.noise]
+    links: list[Any] = [*budget.explained, budget.noise]
     heights = row + np.linspace(-0.3, 0.3, len(links))
     for part, height in zip(links, heights, strict=True):
         if part.gain is None:

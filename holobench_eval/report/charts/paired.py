@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ..results import Results
-from ..scores import Score
 from ..statistics import Array, Estimate
-from .look.medium import medium
-from .look.methods import Look, looks
-from .style import GREY, grid, legend_below, marks, note, save, slugs, stacked, style
+from .look import GREY, Look, grid, legend_below, looks, medium, note, slugs, stacked
 
 ROW, LINE, FRAME = 27, 16, 62  # pixels: of a method, of a line of text, of a panel's title and axis
+BAND = 22  # pixels: of a method's dots where its name stands above them
 SPREAD = 0.3  # of a row to either side of its middle: targets keep their place in it from row to row
 DOT, FEW = 9, 12  # size of a target's dot [square points], twice that for so few targets
-NAMES = 0.28  # of the width, for the names of the methods
+NAMES, ABOVE = 0.28, 0.55  # of the width, for the names of the methods: beside the rows, and above narrow ones
 
 
 @dataclass(frozen=True)
@@ -51,62 +49,73 @@ def draw(results: Results, condition: str, path: Path) -> str:
     rows = sorted(_rows(results, condition), key=lambda row: row.estimate.mean, reverse=score.higher_is_better)
     draw_rows(results, path, condition, rows, lines)
     return (
-        f"{results.headline.axis}{results.text.axis}, on {condition}: differences to the baseline "
-        f"{results.baseline}. Small dots: targets, at the same height in every row; marks and bars: means and "
-        "their 95 % intervals over clusters of targets, not adjusted for the number of comparisons."
+        f"{score.axis}{results.text.axis}, on {condition}: differences to the baseline {baseline}. Small dots: "
+        "targets, at the same height in every row; marks and bars: means and their 95 % intervals over clusters of "
+        "targets, not adjusted for the number of comparisons."
     )
-
-
-def draw_rows(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
-    """Draw rows of differences to the baseline, which is a line at zero; further lines are dashed."""
-    baseline, score = results.baseline, results.headline
-    better = "right" if score.higher_is_better else "left"
-    axis = f"difference to {baseline} in {score.axis}{results.text.axis}; better: to the {better}"
-    axis = medium().wrap(axis, 0.6 * medium().width)
-    labels = [f"baseline: {baseline}"]
-    labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
-    labels = [medium().wrap(label, 0.8 * medium().width) for label in labels]
-    names = [medium().wrap(row.name, NAMES * medium().width) for row in rows]
-    height = FRAME + len(rows) * max(ROW, LINE * max(name.count("\n") + 1 for name in names))  # all are as high
-    footer = LINE * (axis.count("\n") + sum(label.count("\n") + 1 for label in labels) + 1)
-    with style():
-        figure, (axes,) = stacked([title], [height], footer)
-        _dots(axes, rows, names, score)
-        axes.axvline(0, color="black", linewidth=1, zorder=1, label=labels[0])
-        for value, label in zip(lines.values(), labels[1:], strict=True):
-            axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
-        axes.set_xlabel(axis, parse_math=False)
-        legend_below(figure, *axes.get_legend_handles_labels())
-        save(figure, path)
 
 
 def _rows(results: Results, condition: str) -> Iterator[Row]:
     """A row for every method but the baseline; how many targets have no difference stands in its name."""
     looked = looks(results.names)
     for test in results.tests.values() if results.baseline else ():
-        if test.condition != condition or not test.estimate.n:
-            continue
-        name = results.facts.marked(test.second)
-        if test.estimate.n < len(results.targets):
-            name = f"{name}, {test.estimate.n} of {len(results.targets)} targets"
-        yield Row(name, test.differences, test.estimate, looked[test.second])
+        if test.condition == condition and test.estimate.n:
+            name, count = results.facts.marked(test.second), len(results.targets)
+            holes = f", {test.estimate.n} of {count} targets" if test.estimate.n < count else ""
+            yield Row(f"{name}{holes}", test.differences, test.estimate, looked[test.second])
 
 
-def _dots(axes: Axes, rows: Sequence[Row], names: Sequence[str], score: Score) -> None:
-    """Draw rows from above to below, with their names to the left and their numbers to the right of the axes."""
-    for height, row in enumerate(rows):
-        offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
-        size = DOT if len(row.values) > FEW else 2 * DOT
-        axes.scatter(row.values, height + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
-        mean = row.estimate.mean
-        axes.errorbar(
-            mean, height, xerr=row.estimate.reach, fmt="none", ecolor="black", elinewidth=1.3, capsize=3, zorder=4
-        )
-        axes.plot(mean, height, **marks(row.look, 7), markeredgewidth=1, zorder=5)
-        end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}
-        note(axes, score.estimate(row.estimate, signed=True), (1, height), **end)
-    axes.set_yticks(range(len(rows)), names, parse_math=False, fontsize=medium().note)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
-    grid(axes, "x")
+def draw_rows(results: Results, path: Path, title: str, rows: Sequence[Row], lines: Mapping[str, float]) -> None:
+    """Rows of differences from above to below, with names and numbers; zero is the baseline, further lines are dashed.
+
+    Names stand beside the rows, and above the dots where the figure is narrow.
+    """
+    baseline, score, narrow, width = results.baseline, results.headline, medium().narrow, medium().width
+    better = "right" if score.higher_is_better else "left"
+    axis = f"difference to {baseline} in {score.axis}{results.text.axis}; better: to the {better}"
+    axis = medium().wrap(axis, (0.9 if narrow else 0.6) * width)
+    labels = [f"baseline: {baseline}"]
+    labels += [f"{label}, {score.with_unit(value, signed=True)}" for label, value in lines.items()]
+    labels = [medium().wrap(label, 0.8 * width) for label in labels]
+    names = [
+        row.name if medium().height else medium().wrap(row.name, (ABOVE if narrow else NAMES) * width) for row in rows
+    ]
+    tall = [LINE * _lines(name) for name in names]
+    unit = BAND if narrow else max(ROW, *tall)
+    heights = [unit + each * narrow for each in tall]
+    ends = np.cumsum(heights) / unit - 0.5
+    footer = LINE * (_lines(axis) + sum(map(_lines, labels)))
+    for axes in stacked(path, [title], [FRAME + sum(heights)], footer, axis):
+        for row, name, at in zip(rows, names, ends - 0.5, strict=True):
+            offsets = np.linspace(-SPREAD, SPREAD, max(2, len(row.values)))[: len(row.values)]
+            size, mean = DOT if len(row.values) > FEW else 2 * DOT, row.estimate.mean
+            axes.scatter(row.values, at + offsets, s=size, color=row.look.colour, alpha=0.4, linewidth=0, zorder=2)
+            bar: dict[str, Any] = {"fmt": "none", "ecolor": "black", "elinewidth": 1.3, "capsize": 3, "zorder": 4}
+            axes.errorbar(mean, at, xerr=row.estimate.reach, **bar)
+            axes.plot(mean, at, **row.look.marks(7), markeredgewidth=1, zorder=5)
+            end = {"xytext": (6, 0), "xycoords": axes.get_yaxis_transform(), "annotation_clip": False}
+            number = score.estimate(row.estimate, signed=True)
+            if narrow:
+                white = {"facecolor": "white", "edgecolor": "none", "pad": 0}
+                above = end | {"xytext": (0, 2), "va": "bottom", "bbox": white}
+                note(axes, name, (0, at - SPREAD), **above)
+                note(axes, number, (1, at - SPREAD), **above, ha="right")
+            else:
+                note(axes, number, (1, at), **end)
+        beside = [""] * len(rows) if narrow else names
+        axes.set_yticks(ends - 0.5, beside, parse_math=False, fontsize=medium().note)
+        axes.set_ylim(ends[-1], -0.5)
+        axes.tick_params(axis="y", length=0)
+        axes.spines["left"].set_visible(False)
+        grid(axes, "x")
+        axes.axvline(0, color="black", linewidth=1, zorder=1, label=labels[0])
+        for value, label in zip(lines.values(), labels[1:], strict=True):
+            axes.axvline(value, color=GREY, linewidth=1.1, linestyle="--", zorder=1, label=label)
+        axes.set_xlabel(axis, parse_math=False)
+        figure = axes.get_figure(root=True)
+        assert figure is not None
+        legend_below(figure, *axes.get_legend_handles_labels())
+
+
+def _lines(words: str) -> int:
+    return words.count("\n") + 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,8 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..statistics import Array, Estimate
 from ..text import bracketed
-from .look.medium import medium
-from .style import GREY, PALE, grid, new_figure, save, style
+from .look import GREY, PALE, chart, grid, medium
 
 ROW, FRAME, AGREEMENT = 34, 125, 240  # pixels: of a method, around all, and of what stands below
 NAMES = 0.27  # of the width, for the names of the methods
@@ -29,18 +29,16 @@ def draw_ranks(path: Path, title: str, ranks: pd.DataFrame, taus: Array, mean: E
     ranks: a column a method, the nominal places first, then those in each draw; taus: Kendall's tau-b of the draws
     against the nominal places, and their mean.
     """
-    with style():
-        height = FRAME + ROW * max(4, len(ranks.columns))
-        figure = new_figure(medium().width, round(medium().scale * (height + AGREEMENT * medium().narrow)))
+    narrow, height = medium().narrow, FRAME + ROW * max(4, len(ranks.columns))
+    shape: dict[str, Any] = {"columns": 2, "width_ratios": [5, 3]}
+    if narrow:
+        shape = {"rows": 2, "height_ratios": [height, AGREEMENT]}
+    with chart(path, height + AGREEMENT * narrow, **shape) as (figure, panels):
         figure.set_layout_engine("constrained", w_pad=0.08)
-        if medium().narrow:
-            left, right = figure.subplots(2, 1, height_ratios=[height, AGREEMENT])
-        else:
-            left, right = figure.subplots(1, 2, width_ratios=[5, 3])
-        figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize=medium().text + 1, parse_math=False)
-        _shares(left, ranks)
-        _agreement(right, len(ranks.columns), taus, mean)
-        save(figure, path)
+        look = {"x": 0.01, "ha": "left", "weight": "bold", "fontsize": medium().text + 1, "parse_math": False}
+        figure.suptitle(title, **look)
+        _shares(panels.flat[0], ranks)
+        _agreement(panels.flat[1], len(ranks.columns), taus, mean)
 
 
 def _shares(axes: Axes, ranks: pd.DataFrame) -> None:
@@ -55,7 +53,7 @@ def _shares(axes: Axes, ranks: pd.DataFrame) -> None:
         axes.add_patch(
             Rectangle((position - 1.5, row - 0.5), 1, 1, fill=False, edgecolor="black", linewidth=1.5, zorder=3)
         )
-    names = [medium().wrap(label, NAMES * medium().width) for label in ranks]
+    names = [medium().wrap(str(label), NAMES * medium().width) for label in ranks]
     axes.set_yticks(range(count), names, parse_math=False, fontsize=medium().note)
     axes.set_xticks(range(count), [str(rank) for rank in range(1, count + 1)])
     axes.set_xticks(np.arange(count + 1) - 0.5, minor=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,7 +29,7 @@ from ...core.pictures import open_picture
 from ...study.store import Store
 from ..results import DONE, Results
 from ..scores import Score
-from .style import new_figure, save_picture, style
+from .look import chart, medium, new_figure, save_picture, style
 
 Picture = NDArray[np.float64]
 Window = tuple[slice, slice]  # rows and columns of a picture
@@ -127,8 +127,8 @@ class Thumbnails:
             self._targets[reference] = {target: picture for target, picture in pictures if picture is not None}
         return self._targets[reference]
 
-    def tile(self, label: str, condition: str, target: str) -> Tile:
-        """The capture of the first repeat that is done, with its own scores; without one, the reason in its place."""
+    def tile(self, label: str, condition: str, target: str, most: int = 2) -> Tile:
+        """The capture of the first repeat that is done, with at most so many of its scores, or why there is none."""
         cells = self.results.cells[label, condition]
         cells = cells[cells["target"] == target]
         if cells.empty:
@@ -142,7 +142,7 @@ class Thumbnails:
             return Tile(None, "no thumbnail of this capture")
         if picture.shape != shape:
             return Tile(None, f"thumbnail is {picture.shape[1]} x {picture.shape[0]}, target {shape[1]} x {shape[0]}")
-        scores = [self.results.headline, *(score for score in self.results.leading if score.metric == "ssim")][:2]
+        scores = [self.results.headline, *(score for score in self.results.leading if score.metric == "ssim")][:most]
         return Tile(picture, noted(scores, cell))
 
     def by_quality(self, condition: str) -> list[str]:
@@ -197,6 +197,27 @@ def draw_rows(path: Path, title: str, target: tuple[str, Picture], rows: Sequenc
                 shown = tile if tile.picture is None else replace(tile, picture=tile.picture[window])
                 page.tile(left, top, (tall, wide), shown)
         page.save(path)
+
+
+def draw_wall(
+    path: Path, title: str, below: str, rows: Mapping[str, tuple[Picture, Sequence[tuple[str, Tile]]]]
+) -> None:
+    """Draw a slide of captures, a row a target: its picture, then a capture a method; ``below`` all stands below."""
+    columns = 1 + max(len(tiles) for _, tiles in rows.values())
+    with chart(path, 0, len(rows), columns) as (figure, panels):
+        figure.set_layout_engine("constrained", h_pad=0.12)  # a row's scores need room above the next row
+        figure.suptitle(medium().wrap(title, 0.76 * medium().width), weight="bold", fontsize=1.25 * medium().text)
+        figure.supxlabel(below, fontsize=medium().note, parse_math=False)
+        letters = medium().characters(medium().width / columns)
+        for row, (target, (picture, tiles)) in zip(panels, rows.items(), strict=True):
+            for axes, (name, tile) in zip(row, [("target", Tile(picture, target)), *tiles], strict=True):
+                axes.imshow(np.full_like(picture, 0.93) if tile.picture is None else tile.picture)
+                axes.set(xticks=[], yticks=[])
+                axes.spines[:].set_visible(False)
+                axes.set_xlabel(textwrap.shorten(tile.note, letters, placeholder="..."), parse_math=False)
+                if axes in panels[0]:
+                    parts = textwrap.wrap(name.replace("_", "_ "), letters, max_lines=3, placeholder="...")
+                    axes.set_title("\n".join(parts).replace("_ ", "_"), parse_math=False)
 
 
 def tile_size(shape: tuple[int, ...]) -> tuple[int, int]:

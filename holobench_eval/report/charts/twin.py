@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ...optics.colour import srgb_encode
-from .look.medium import medium
-from .look.methods import Look
-from .style import GREY, PALE, grid, laid_out, save, style, without_math
+from .look import GREY, PALE, Look, chart, grid, legend_beside
 from .tiles import Picture, Tile, draw_rows
 
 LOUDER = 4.0  # factor of differences
@@ -43,23 +41,18 @@ def draw_twin_scores(
     others: Sequence[Mapping[str, NDArray[np.float64]]],
 ) -> None:
     """Draw the score of each picture on the twin over that on the display, a colour a method; of ``others`` pale."""
-    with style():
-        side = round(medium().scale * 480)
-        figure, ((axes,),) = laid_out(round(1.45 * side), side)
-        every = np.concatenate([*display.values(), *twin.values()])
-        ends = np.array([every.min() - 0.5, every.max() + 0.5])
+    with chart(path, 480, width=696) as (_, ((axes,),)):
+        scores = np.concatenate([*display.values(), *twin.values()])
+        ends = np.array([scores.min() - 0.5, scores.max() + 0.5])
         axes.plot(ends, ends, color=GREY, linewidth=0.8, label="as on the display")
         for number, other in enumerate(others):
             for label, scores in other.items():
-                marker = "x+"[number % 2]
-                axes.scatter(display[label], scores, s=18, color=PALE, marker=marker, linewidths=0.8)
+                axes.scatter(display[label], scores, s=18, color=PALE, marker="x+"[number % 2], linewidths=0.8)
         for label, scores in twin.items():
-            own = looks[label]
-            axes.scatter(
-                display[label], scores, s=34, marker=own.marker, facecolor=own.face, edgecolor=own.colour, label=label
-            )
-        axes.set(xlim=ends, ylim=ends, aspect="equal")
-        axes.set(xlabel="PSNR on the display [dB]", ylabel="PSNR on the twin [dB]")
+            given = {"marker": looks[label].marker, "facecolor": looks[label].face, "edgecolor": looks[label].colour}
+            axes.scatter(display[label], scores, s=34, label=label, **given)
+        axes.set(
+            xlim=ends, ylim=ends, aspect="equal", xlabel="PSNR on the display [dB]", ylabel="PSNR on the twin [dB]"
+        )
         grid(axes)
-        without_math(axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False))
-        save(figure, path)
+        legend_beside(axes)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..board import board
 from ..charts.curves import draw_costs
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..facts import OFFLINE, ONLINE
 from ..phrases import effect, value
 from ..results import Results

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -166,7 +166,7 @@ def boards(board: Board) -> list[object]:
     """The board of each display, under its name where there are several: a row a method, its group above it."""
     parts = list[object]()
     for display in board.displays:
-        lines = list[dict[str, object]]()
+        lines = list[Mapping[str, object]]()
         for group, rows in display.groups:
             own = [_line(board, display, row) for row in rows]
             if len(display.groups) > 1:

@@ -15,7 +15,7 @@ so that a dark picture counts as much as a bright one, as it does in a mean of d
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -151,7 +151,7 @@ def table(board: Board) -> Markdown | None:
             for label, part in _over(known).items()
         ]
         return table_of(rows)
-    lines = list[dict[str, object]]()
+    lines = list[Mapping[str, object]]()
     for budget in known:
         for part in budget.parts:
             model = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from ..board import Board
 from ..facts import PLACES
@@ -20,7 +20,7 @@ LIMITS = ("Scenes: planes or views of a scene are not independent, so intervals 
 
 # By measure: what a hologram is made of that knows of all and that knows of one; the title of the details; what their
 # columns are, and in which unit; and what must be known of these.
-WORDS = {
+WORDS: Mapping[str, tuple[tuple[str, str], str, tuple[str, str], str]] = {
     "focus": (
         ("all planes", "one plane"),
         "Plane by plane",
@@ -88,7 +88,7 @@ def table(board: Board) -> Markdown | None:
     return table_of(rows)
 
 
-def _render(report: Report, _: Figures) -> Blocks:
+def _render(report: Report, figures: Figures) -> Blocks:
     _, title, _, explanation = WORDS[report.results.study.measure]
     yield heading(title)
     yield f"{report.results.headline.axis}, mean over scenes. {explanation}"
@@ -99,13 +99,13 @@ def _render(report: Report, _: Figures) -> Blocks:
 
 def by_plane(results: Results, condition: str) -> Markdown | None:
     """Mean over scenes at every plane, a row a method, and seconds."""
-    score, rows, places_of = results.headline, [], results.facts.targets["place"].reindex(results.targets)
+    score, rows, place = results.headline, [], results.facts.targets["place"].reindex(results.targets)
     places, unit = WORDS[results.study.measure][2]
     for label in results.methods(condition):
         values = results.values(label, condition)
         row = {"method": marked(results, label, condition), "hologram of": _made_of(results, label)}
         for plane in _planes(results):
-            here = values[(places_of == plane).to_numpy()]
+            here = values[(place == plane).to_numpy()]
             row[f"{plane:g}{unit}"] = score.estimate(mean_interval(here))
         row[f"all {places}"] = score.number(float(values.mean()))
         rows.append(row | _seconds(results, label, condition))

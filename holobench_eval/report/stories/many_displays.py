@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from ...study.calibration.family import load_family, names
 from ..board import Board
 from ..charts import paired
 from ..charts.family import draw_map
-from ..charts.look.methods import looks
+from ..charts.look import looks
 from ..markdown import Markdown, table_of
 from ..phrases import effect
 from ..results import Results
@@ -49,44 +50,37 @@ def shown_on(results: Results) -> list[str]:
     return [name for name in results.conditions if all(results.is_complete(label, name) for label in rows)]
 
 
-@dataclass(frozen=True)
-class Margin:
-    """A method minus the baseline. values: ``(displays,)`` means over targets; over_both: their mean, with an interval
-    over displays and clusters of targets together; better, worse: displays on which the family of tests shows it."""
+class Margin(NamedTuple):
+    """A method minus the baseline. values: ``(displays,)`` means over targets, with their 5, 50 and 95 % quantiles;
+    over_both: their mean, with an interval over displays and clusters of targets together; better, worse: displays on
+    which the family of tests shows it."""
 
     label: str
     values: Array
+    low: float
+    median: float
+    high: float
     over_both: Estimate
     better: int
     worse: int
-
-    @property
-    def median(self) -> float:
-        """Over displays."""
-        return float(np.median(self.values))
-
-    @property
-    def spread(self) -> Array:
-        """The 5 and 95 % quantiles over displays."""
-        return np.quantile(self.values, (0.05, 0.95))
 
 
 def margins(results: Results) -> list[Margin]:
     """Every method but the baseline and oracles, the best first."""
     where, sign, baseline = shown_on(results), results.headline.sign, str(results.baseline)
     clusters, index = np.unique(results.clusters, return_inverse=True)
-    shares = np.eye(len(clusters))[index] / np.bincount(index)
-    rows = list[Margin]()
+    shares, rows = np.eye(len(clusters))[index] / np.bincount(index), list[Margin]()
     for label in results.labels if where else ():
         if label != baseline and label not in results.facts.oracles:
-            both = ([results.values(row, name) for name in where] for row in (label, baseline))
-            differences = np.subtract(*both)
+            own, other = ([results.values(row, name) for name in where] for row in (label, baseline))
+            differences = np.subtract(own, other)
             tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
             effects = [effect(results.headline, test) for test in tests]
-            by_cluster = differences @ shares
+            values, by_cluster = differences.mean(1), differences @ shares
+            low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
             better, worse = effects.count("better"), effects.count("worse")
-            rows.append(Margin(label, differences.mean(1), over_both, better, worse))
+            rows.append(Margin(label, values, low, median, high, over_both, better, worse))
     return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 
 
@@ -116,11 +110,8 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def _beats(results: Results, row: Margin, count: int) -> str:
-    score, (low, high) = results.headline, row.spread
-    worse, ends = (
-        f" and loses on {row.worse}" * bool(row.worse),
-        f"{score.number(low, True)} to {score.number(high, True)}",
-    )
+    score, worse = results.headline, f" and loses on {row.worse}" * bool(row.worse)
+    ends = " to ".join(score.number(end, signed=True) for end in (row.low, row.high))
     text = f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: median "
     text += f"{score.with_unit(row.median, signed=True)}, nine in ten {ends}."
     margin = published(results, row.label, results.conditions[0])
@@ -237,7 +228,7 @@ def judged(results: Results) -> dict[str, tuple[int, int]]:
     for other in itertools.islice(models, 1):
         for score in (*other.control, other.headline):
             agree = []
-            for name, gain in gained.iterrows():
+            for name, gain in zip(shown_on(results), gained.to_dict("records"), strict=True):
                 means = {
                     label: other.values(label, name, score.key).mean()
                     for label in other.methods(name)
@@ -258,7 +249,7 @@ def table(board: Board) -> Markdown | None:
                 "method": row.label,
                 f"over displays and pictures{score.brackets}": score.estimate(row.over_both, signed=True),
                 f"median{score.brackets}": score.number(row.median, signed=True),
-                "5 to 95 % of displays": " to ".join(score.number(end, signed=True) for end in row.spread),
+                "5 to 95 % of displays": " to ".join(score.number(end, signed=True) for end in (row.low, row.high)),
                 f"better on [of {count}]": row.better,
                 "worse on": row.worse,
             }

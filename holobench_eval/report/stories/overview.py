@@ -214,53 +214,42 @@ def _details(report: Report, _: Figures) -> Blocks:
 
 
 def _setup(report: Report, _: Figures) -> Blocks:
-    yield heading("What was measured")
-    yield report.results.text.procedure
-    yield properties((_from_files if report.results.study.measure == FILES else _on_displays)(report).items())
-
-
-def _on_displays(report: Report) -> dict[str, str]:
-    """Name and value of everything that was the same for all methods."""
-    study, results, cells = report.results.study, report.results, [record["cell"] for record in report.records]
-    sets = dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)
-    panels = dict.fromkeys(" x ".join(map(str, cell["panel"])) + " pixels" for cell in cells)
-    rows = dict[str, str]()
-    if study.predicts:
-        rows["measured"] = (
-            f"predictions of the captures of holograms by {study.holograms.name} ({plain(study.holograms.params)})"
-        )
-    rows |= {"targets": _targets(results), "dataset": "; ".join(sets)}
+    """Everything that was the same for all methods, on displays or of pictures that were given."""
+    study, results = report.results.study, report.results
+    files, probe = study.measure == FILES, f"{study.holograms.name} ({plain(study.holograms.params)})"
+    cells = [record["cell"] for record in report.records]
+    panels = dict.fromkeys(
+        " x ".join(map(str, cell["panel"])) + " pixels"
+        for cell in cells
+        if not files or (cell["panel"] and not is_reference(cell["condition"]))
+    )
+    images = ""
     if given := results.facts.training:
         limit = "no limit on captures" if given.captures is None else f"at most {given.captures} captures"
-        watch = f"of which {given.held_out} only watch the training"
-        rows["training images"] = f"{given.images} of {given.dataset}, {watch}; {limit}"
-    return rows | {
-        "panel": "; ".join(panels),
-        "exposure": _distinct(results, "exposure"),
-        "metric protocol": _distinct(results, "protocol"),
-        "repeats": str(results.frame["repeat"].nunique()),
-        "seed": str(study.seed),
+        images = f"{given.images} of {given.dataset}, of which {given.held_out} only watch the training; {limit}"
+    distinct = {name: ", ".join(sorted({*results.frame[name]} - {""})) for name in ("exposure", "protocol")}
+    more, names = len(results.targets) - TARGETS_NAMED, ", ".join(results.targets[:TARGETS_NAMED])
+    rows = {
+        "measured": study.predicts and f"predictions of the captures of holograms by {probe}",
+        "targets": f"{len(results.targets)}{_among(results)}: {names}{f' and {more} more' if more > 0 else ''}",
+        "size of the captures": files and "; ".join(panels).replace(" pixels;", ";"),
+        "compared": files and results.text.compared,
+        "dataset": not files
+        and "; ".join(dict.fromkeys(f"{cell['dataset']} ({plain(cell['dataset_params'])})" for cell in cells)),
+        "training images": bool(images) and not files and images,
+        "panel": not files and "; ".join(panels),
+        "exposure": not files and distinct["exposure"],
+        "metric protocol": distinct["protocol"],
+        "repeats": not files and results.frame["repeat"].nunique(),
+        "seed": not files and str(study.seed),
         "headline metric": results.headline.axis,
         "baseline": results.baseline or "none",
-        "registration": _registration(results),
+        "registration": not files and _registration(results),
         "saturated samples of a capture": _saturation(results),
     }
-
-
-def _from_files(report: Report) -> dict[str, str]:
-    """The same where the pictures were given."""
-    results, cells = report.results, [record["cell"] for record in report.records]
-    panels = [cell["panel"] for cell in cells if cell["panel"] and not is_reference(cell["condition"])]
-    sizes = dict.fromkeys(" x ".join(map(str, panel)) for panel in panels)
-    return {
-        "targets": _targets(results),
-        "size of the captures": f"{'; '.join(sizes)} pixels",
-        "compared": report.results.text.compared,
-        "metric protocol": _distinct(results, "protocol"),
-        "headline metric": results.headline.axis,
-        "baseline": report.results.baseline or "none",
-        "saturated samples of a capture": _saturation(results),
-    }
+    yield heading("What was measured")
+    yield results.text.procedure
+    yield properties((name, value) for name, value in rows.items() if value is not False)
 
 
 def _registration(results: Results) -> str:
@@ -286,15 +275,6 @@ def _saturation(results: Results) -> str:
         return "none: there is no sensor"
     most = float(results.done["saturated"].max())
     return f"at most {100 * most:.3g} %" if most >= 0 else "not recorded"
-
-
-def _targets(results: Results) -> str:
-    more, names = len(results.targets) - TARGETS_NAMED, ", ".join(results.targets[:TARGETS_NAMED])
-    return f"{len(results.targets)}{_among(results)}: {names}{f' and {more} more' if more > 0 else ''}"
-
-
-def _distinct(results: Results, column: str) -> str:
-    return ", ".join(sorted(set(results.frame[column]) - {""}))
 
 
 def _described(report: Report, _: Figures) -> Blocks:
@@ -367,7 +347,7 @@ def _holes(report: Report, _: Figures) -> Blocks:
         yield "None: every planned cell has a score."
     else:
         yield "Cells without a score. They enter no mean, and a method without a score for every target is not ranked."
-        yield table_of(holes.to_dict("records"))
+        yield table(list(holes), holes.to_numpy().tolist())
 
 
 def _environment(report: Report, _: Figures) -> Blocks:
@@ -397,15 +377,13 @@ def _has_scores(report: Report) -> bool:
     return _has_displays(report) and values is not None and bool(np.isfinite(values).any())
 
 
-ANSWER = Part(2, _answer, applies=_has_displays)
-LIMITATIONS = Part(75, _limits, applies=_has_displays)
 PARTS = (
     Part(0, _title),
-    ANSWER,
+    Part(2, _answer, applies=_has_displays),
     Part(3, _table, applies=_has_scores),
     Part(4, applies=_has_scores, figures=lambda report: report.once(_figures)[:1]),
     Part(6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
-    LIMITATIONS,
+    Part(75, _limits, applies=_has_displays),
     Part(210, _reproduce),
     Part(1, _details, details=True),
     Part(5, _more_limits, applies=_has_displays, details=True),

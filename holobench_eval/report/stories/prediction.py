@@ -98,8 +98,8 @@ def table(board: Board) -> Markdown | None:
         headers += [score.heading, "least to most of displays"]
         for label, cells in lines.items():
             known = _means(results, label, score)
-            mean, least, most = map(score.number, (np.mean(known), min(known), max(known))) if known else ("–", "", "")
-            cells += [mean, f"{least} to {most}" if known else "–"]
+            ends = f"{score.number(min(known))} to {score.number(max(known))}" if known else "–"
+            cells += [score.number(float(np.mean(known))) if known else "–", ends]
     return markdown.table(headers, list(lines.values()))
 
 

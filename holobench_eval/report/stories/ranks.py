@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,8 +15,8 @@ from scipy import stats
 
 from ...display.simulated.changes.draws import MODEL, PARAMETERS
 from ..board import Board
+from ..charts.look import slugs
 from ..charts.ranks import draw_ranks
-from ..charts.style import slugs
 from ..facts import OFFLINE, Swept
 from ..markdown import Markdown, bullets, heading, table_of
 from ..results import Results
@@ -34,16 +35,26 @@ ENOUGH = 0.5
 CIRCULAR = frozenset({"zero_phase"})
 
 
+class Pair(NamedTuple):
+    """Two methods, the nominally better one first: by how much it is, nominally and in each draw, and in how many draws
+    the order is the other way; a tie is no order."""
+
+    first: str
+    second: str
+    nominal: float
+    draws: Array
+    flips: int
+
+
 class Ranks:
     """The ranking of methods on a display and on the draws of it.
 
     Methods that see the camera for the scored image, or inside the bench, are not among those that are ranked.
 
-    quality: mean headline, turned so that larger is better, a column a ranked method, nominally best first; a row for
-    the display (0) and one for each draw (from 1) in which all of them have every target. ranks: the same as places
-    from 1; equal means share the better one. unranked: methods without every target nominally and in enough draws.
-    taus: Kendall's tau-b of each draw's ranking against the nominal one, without draws in which all methods tie.
-    drawn: the parameters of these draws, a column each.
+    methods: those that are ranked, nominally best first; unranked: those without every target nominally or in enough
+    draws. quality: mean headline, turned so that larger is better, a column a ranked method, a row for the display (0)
+    and one for each draw (from 1) in which all of them have every target; ranks: the same as places from 1; equal means
+    share the better one. drawn: the parameters of these draws, a column each.
     """
 
     def __init__(self, swept: Swept, results: Results) -> None:
@@ -52,20 +63,25 @@ class Ranks:
         labels = [label for label in results.methods(swept.before) if results.category(label) in OFFLINE]
         means = {label: [results.values(label, name).mean() for name in names] for label in labels}
         quality = results.headline.sign * pd.DataFrame(means, range(len(names)), dtype=np.float64)
-        known = quality[1:].notna()
-        enough = quality.loc[0].notna() & known.any() & (known.sum() >= ENOUGH * known.any(axis=1).sum())
-        self.unranked = [label for label in labels if not enough[label]]
-        best_first = quality.loc[0, enough].sort_values(ascending=False, kind="stable").index
-        self.quality = quality[best_first].dropna()
+        known = quality.notna().to_numpy()
+        enough = known[0] & known[1:].any(axis=0) & (known[1:].sum(axis=0) >= ENOUGH * known[1:].any(axis=1).sum())
+        ranked = [label for label, is_ranked in zip(labels, enough, strict=True) if is_ranked]
+        self.unranked = [label for label in labels if label not in ranked]
+        self.methods = sorted(ranked, key=lambda label: -results.headline.sign * means[label][0])
+        self.quality = quality[self.methods].dropna() if ranked else quality.iloc[:1, :0]
         self.ranks = self.quality.rank(axis=1, method="min", ascending=False)
-        taus = [stats.kendalltau(self.quality.loc[0], row).statistic for _, row in self.quality[1:].iterrows()]
-        self.taus = np.array([tau for tau in taus if np.isfinite(tau)])
         self.drawn = pd.DataFrame(swept.drawn, range(1, len(swept.drawn) + 1)).reindex(self.quality.index[1:])
+
+    @cached_property
+    def taus(self) -> Array:
+        """Kendall's tau-b of each draw's ranking against the nominal one, without draws in which all methods tie."""
+        taus = [stats.kendalltau(self.quality.loc[0], row).statistic for _, row in self.quality[1:].iterrows()]
+        return np.array([tau for tau in taus if np.isfinite(tau)])
 
     @property
     def exists(self) -> bool:
         """Whether there is a ranking: two methods that differ on the nominal display and in a draw."""
-        return self.quality.shape[1] > 1 and len(self.taus) > 0
+        return len(self.methods) > 1 and len(self.taus) > 0
 
     @property
     def tau(self) -> Estimate:
@@ -74,15 +90,14 @@ class Ranks:
         return replace(mean, high=min(mean.high, 1.0))  # no correlation is larger
 
     @cached_property
-    def pairs(self) -> pd.DataFrame:
-        """Every two ranked methods, the nominally better one first: by how much it is, nominally and in each draw,
-        and in how many draws the order is the other way; a tie is no order."""
-        rows = []
-        for first, second in itertools.combinations(self.quality, 2):
-            nominal, *draws = self.quality[first] - self.quality[second]
+    def pairs(self) -> list[Pair]:
+        """Every two ranked methods, those that change places most often first."""
+        pairs = []
+        for first, second in itertools.combinations(self.methods, 2):
+            nominal, *draws = (self.quality[first] - self.quality[second]).tolist()
             flips = int((np.sign(draws) * np.sign(nominal) < 0).sum())
-            rows.append((first, second, nominal, np.array(draws), flips))
-        return pd.DataFrame(rows, columns=["first", "second", "nominal", "draws", "flips"])
+            pairs.append(Pair(first, second, nominal, np.array(draws), flips))
+        return sorted(pairs, key=lambda pair: -pair.flips)
 
     def share(self, draws: int) -> Estimate:
         """A share of the draws with its 95 % interval (Wilson 1927)."""
@@ -99,14 +114,12 @@ class Ranks:
         None for nothing that was drawn."""
         known = dict[str, Array]()
         for name, column in self.drawn.items():
-            parameter, values = PARAMETERS[str(name)], column.to_numpy()
+            given, values = PARAMETERS[str(name)], column.to_numpy()
             if name in CIRCULAR:
-                known[f"sine of the {parameter.words}"] = np.sin(values)
-                known[f"cosine of the {parameter.words}"] = np.cos(values)
+                known |= {f"sine of the {given.words}": np.sin(values), f"cosine of the {given.words}": np.cos(values)}
                 continue
-            known[parameter.words] = values
-            if parameter.low < 0 < parameter.high:
-                known[f"size of the {parameter.words}"] = np.abs(values)
+            known[given.words] = values
+            known |= {f"size of the {given.words}": np.abs(values)} if given.low < 0 < given.high else {}
         strongest = cause(differences, known)
         return strongest if strongest and strongest.is_clear else None
 
@@ -127,22 +140,17 @@ def verdicts(results: Results) -> Iterator[str]:
     if not existing:
         yield "Methods with all scores tie before any draw or in each of them, so there is no ranking to compare."
     for each in existing:
-        display, nominal = each.swept.before, each.ranks.loc[0]
-        leader = nominal.index[nominal == 1][0]
+        display, score = each.swept.before, results.headline
+        leader = next(label for label in each.methods if each.ranks[label][0] == 1)
+        turned = (pair for pair in each.pairs if pair.flips and score.number(abs(pair.nominal)).strip("0."))
+        passes = [
+            f" Most often {pair.second} passes {pair.first}, on {percent(each.share(pair.flips))} %." for pair in turned
+        ]
         yield (
             f"{f'{display}: ' * (len(existing) > 1)}{leader}, best on {display}, is best on "
-            f"{percent(each.first(leader))} % of {len(each.quality) - 1} draws of it. Kendall's tau of rankings is "
-            f"{bracketed(each.tau, '.2f')}.{_turning(each)}"
+            f"{percent(each.first(leader))} % of its draws. Kendall's tau of rankings is "
+            f"{bracketed(each.tau, '.2f')}.{''.join(passes[:1])}"
         )
-
-
-def _turning(each: Ranks) -> str:
-    score = each.results.headline
-    apart = [pair for pair in each.pairs.itertuples() if pair.flips and score.number(abs(pair.nominal)).strip("0.")]
-    if not apart:
-        return ""
-    most = max(apart, key=lambda pair: pair.flips)
-    return f" Most often {most.second} passes {most.first}, on {percent(each.share(most.flips))} %."
 
 
 def table(board: Board) -> Markdown | None:
@@ -154,12 +162,13 @@ def table(board: Board) -> Markdown | None:
                 "method": label,
                 "nominal rank": f"{places[0]:.0f}",
                 "first in [% of draws]": percent(each.first(label)),
-                "mean rank": f"{places[1:].mean():.1f}",
-                "best rank": f"{places[1:].min():.0f}",
-                "worst rank": f"{places[1:].max():.0f}",
+                "mean rank": f"{np.mean(places[1:]):.1f}",
+                "best rank": f"{min(places[1:]):.0f}",
+                "worst rank": f"{max(places[1:]):.0f}",
             }
             for each in existing[:1]
-            for label, places in each.ranks.items()
+            for label in each.methods
+            for places in [each.ranks[label].tolist()]
         ]
     )
 
@@ -204,8 +213,8 @@ def left_out(each: Ranks) -> Iterator[str]:
 
 def flips(each: Ranks) -> Iterator[dict[str, str]]:
     """Of the pairs whose order is the other way in some draw, most often first: by how much, and what it goes with."""
-    score, turning = each.results.headline, each.pairs[each.pairs["flips"] > 0]
-    for pair in turning.sort_values("flips", ascending=False, kind="stable").itertuples():
+    score = each.results.headline
+    for pair in filter(lambda pair: pair.flips, each.pairs):
         cause, text = each.cause(pair.draws), "nothing drawn"
         if cause:
             text = f"{cause.parameter} (rank correlation {cause.rho:+.2f}, R2 {cause.explained:.2f})"

@@ -14,7 +14,7 @@ import pandas as pd
 from ...display.simulated.changes import KINDS
 from ..board import Board, is_gray
 from ..charts.curves import draw_sweep
-from ..charts.style import slugs
+from ..charts.look import slugs
 from ..charts.tiles import draw_rows, spread
 from ..facts import OFFLINE, ONLINE, Swept
 from ..markdown import DETAILS, Markdown, blocks, heading, table_of
@@ -59,6 +59,11 @@ class Point(NamedTuple):
     def change(self) -> str:
         """What changes, in words."""
         return KINDS[self.kind].words
+
+    @property
+    def is_before(self) -> bool:
+        """Whether nothing is changed."""
+        return self.condition == self.display
 
 
 def sweeps(results: Results) -> dict[tuple[str, str, str], list[Point]]:
@@ -144,13 +149,14 @@ def _costs(results: Results, here: list[list[Point]], label: str) -> Iterator[st
     points = [point for points in here for point in points if point.method == label]
     for worst, loss in _lost(points)[:1]:
         cost = f"{label} {_moved(score, loss)} at most, with {worst.change}, {worst.text}"
-        lead = next(point.lead for point in points if point.condition == point.display)
+        lead = next(point.lead for point in points if point.is_before)
         if lead is None:
             yield f"{cost}."
         elif lead.mean <= 0:
             yield f"{cost}. It has no lead over {baseline} to lose: {score.with_unit(lead.mean, signed=True)} before."
         else:
-            least = min(point.lead.mean for point in points if point.lead)
+            leads = (point.lead.mean for point in points if point.lead and not point.is_before)
+            least = min(leads, default=lead.mean)
             ends = "keeps a lead" if least > 0 else "loses its lead"
             yield f"{cost}. It {ends} over {baseline}: {score.with_unit(least, signed=True)} at least."
 
@@ -165,9 +171,8 @@ def _moved(score: Score, loss: Estimate) -> str:
 def _seen(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """Which methods are above the baseline, by their intervals, for an eye whose pupil is at each place."""
     score, baseline = results.headline, str(results.baseline)
-    pupils = [point for points in here for point in points if point.kind == "eye_pupil"]
-    aside = [point for point in pupils if point.condition != point.display and float(point.value)]
-    leads = ((point.value, (point, point.lead)) for point in aside if point.lead)
+    pupils = [point for points in here for point in points if point.kind == "eye_pupil" and not point.is_before]
+    leads = ((point.value, (point, point.lead)) for point in pupils if point.lead and float(point.value))
     for place, rivals in grouped(leads).items():
         ranked = sorted(rivals, key=lambda rival: -rival[1].mean)
         above, (best, lead) = sum(lead.low > 0 for _, lead in ranked), ranked[0]
@@ -188,7 +193,7 @@ def _ranges(results: Results, here: list[list[Point]]) -> Iterator[str]:
 def small_range(points: list[Point]) -> str | None:
     """The numbers around the nominal one up to which the mean changes by at most ``SMALL``, with their unit:
     ``-5 or less to 2 mm`` where nothing below -5 was tested; ``nowhere``. None where the next one has no score."""
-    start, ends = [point.condition for point in points].index(points[0].display), list[float]()
+    start, ends = [point.is_before for point in points].index(True), list[float]()
     for unchanged, *others in (points[start::-1], points[start:]):
         end = unchanged.value
         for point in others:
@@ -199,7 +204,7 @@ def small_range(points: list[Point]) -> str | None:
             end = point.value
         ends.append(float(end))
     low, high = ends
-    tested = [float(point.value) for point in points if point.condition != point.display]
+    tested = [float(point.value) for point in points if not point.is_before]
     less, more = " or less" * (low == min(tested)), " or more" * (high == max(tested))
     span = f"{low:g}{less} to {high:g}{more} {KINDS[points[0].kind].unit}".strip()
     return span if low < high else "nowhere"
@@ -233,8 +238,8 @@ def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[E
 def _judged(results: Results, points: list[Point], until: float | None) -> tuple[bool, str, str]:
     """Whether a published claim of robustness holds: no mean loss above a decibel; in words, and of which change."""
     score, far = results.headline, math.inf if until is None else until
-    within = [point for point in points if not (isinstance(point.value, float) and abs(point.value) > far)]
-    within = [point for point in within if point.condition != point.display]
+    changed = [point for point in points if not point.is_before]
+    within = [point for point in changed if not (isinstance(point.value, float) and abs(point.value) > far)]
     method, change = points[0].method, points[0].change
     if not (lost := _lost(within)) or len(lost) < len(within) or score.unit != "dB":
         return False, f"cannot be judged for {method}: some points have no score.", change
@@ -308,11 +313,12 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
         yield path, f"Captures of {target} on {display} along a change: {change}."
 
 
-def _applies(report: Report) -> bool:
-    return applies(report.results)
-
-
 PARTS = (
-    Part(35, applies=_applies, figures=lambda report: report.pictures("sweep-*.jpg", _pictures), details=True),
-    Part(62, _render, applies=_applies, details=True),
+    Part(
+        35,
+        applies=lambda report: applies(report.results),
+        figures=lambda report: report.pictures("sweep-*.jpg", _pictures),
+        details=True,
+    ),
+    Part(62, _render, applies=lambda report: applies(report.results), details=True),
 )

@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...display.estimates import QUANTITIES
 from ...study.artifacts import TrainingRecord, training_records
 from ...study.plan import is_reference
 from ..charts.curves import draw_trainings
-from ..markdown import Markdown, bullets, heading, table_of
+from ..markdown import bullets, heading, table_of
 from ..results import DONE
 from ..story import Blocks, Figures, Part, Report, is_many
 from ..text import grouped, number, words
@@ -25,7 +24,6 @@ from ..text import grouped, number, words
 ORDER = 210
 DISPLAY = "the display itself"
 DIGITS = 10  # of a sha256 that are printed
-COLOURS = {None: "all", 0: "red", 1: "green", 2: "blue"}
 MOST = 1e12  # no quantity is anywhere near; a larger number in a stranger's file is no estimate
 T = TypeVar("T")
 
@@ -74,11 +72,11 @@ def trainings(report: Report) -> list[Training]:
         uses += [(needed[-1], (DISPLAY, facts.network, "")) for _, needed in prepared]
     known, learned = training_records(report.output), list[Training]()
     for identity, users in grouped(uses).items():
-        labels, display, record = tuple(dict.fromkeys(label for label, *_ in users)), users[0][1], known.get(identity)
-        if record:
-            display = str(record.provenance["description"].get("profile", display))
+        labels, display, trained = tuple(dict.fromkeys(label for label, *_ in users)), users[0][1], known.get(identity)
+        if trained:
+            display = str(trained.provenance["description"].get("profile", display))
         digests = frozenset(digest for *_, digest in users if digest)
-        learned.append(Training(words(list(labels)), labels, display, record, digests))
+        learned.append(Training(words(list(labels)), labels, display, trained, digests))
     names = Counter(training.name for training in learned)
     return [replace(each, name=f"{each.name} on {each.display}") if names[each.name] > 1 else each for each in learned]
 
@@ -102,7 +100,7 @@ def _summary(report: Report) -> Iterator[dict[str, object]]:
     for labels, same in grouped((each.labels, each) for each in learned).items():
         rounds = [len(each.record.rounds) if each.record else math.nan for each in same]
         known = {name: [each.fact(name, (int, float), math.nan) for each in same] for name in ("captures", "seconds")}
-        row = {"method": words(list(labels)), "trained on": _on(same)}
+        row: dict[str, object] = {"method": words(list(labels)), "trained on": _on(same)}
         row |= {name: _ends(values) for name, values in (known | {"rounds": rounds}).items()}
         row |= {"images": given.images - given.held_out if given else "–", "held out": given.held_out if given else "–"}
         if any(each.text("perceptual") for each in learned):
@@ -172,33 +170,9 @@ def estimates(training: Training) -> Iterator[dict[str, Any]]:
 
 
 def _number(value: object) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST
-    return float(value) if is_number else math.nan
-
-
-def quantities(rows: Sequence[Mapping[str, Any]]) -> Markdown | None:
-    """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth; of what no capture
-    shows, neither."""
-    colours: list[int | None] = sorted({row["colour"] for row in rows if row["colour"] is not None})
-    if colours == [0]:  # of the only laser
-        rows, colours = [{**row, "colour": None} for row in rows], []
-    if any(row["colour"] is None for row in rows):
-        colours.append(None)
-    has_truth, lines = any(not math.isnan(row["truth"]) for row in rows), []
-    for name, same in grouped((row["name"], row) for row in rows).items():
-        first, cells, off = same[0], dict.fromkeys(colours, ""), [-1.0]
-        for row in same:
-            truth = "–" if math.isnan(row["truth"]) else f"{row['truth']:.3f}"
-            seen = row.get("seen") is not False
-            cells[row["colour"]] = f"{row['value']:.3f}{f' ({truth})' * has_truth}" if seen else "–"
-            off += [row["apart"]] * (seen and not math.isnan(row["apart"]))
-        line = {"quantity": QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")}
-        line |= {"unit": first["unit"] or ""}
-        line |= {COLOURS.get(colour, f"colour {colour}"): cell for colour, cell in cells.items()}
-        line["largest difference"] = f"{max(off):.3f}" if off[1:] else "–"
-        stated = "–" if math.isnan(first["error"]) else f"{first['error']:.2g}"
-        lines.append(line | {"stated error": "not seen" if first.get("seen") is False else stated})
-    return table_of(lines)
+    if isinstance(value, int | float) and not isinstance(value, bool) and -MOST < value < MOST:
+        return float(value)
+    return math.nan
 
 
 def verdict(rows: Sequence[Mapping[str, Any]]) -> str:

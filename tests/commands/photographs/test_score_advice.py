@@ -8,8 +8,8 @@ import pytest
 from holobench_eval.core.errors import CellError
 from holobench_eval.imaging.align import PLAIN, align
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.answers import kind_of
-from holobench_eval.report.answers.comparison import lacking
+from holobench_eval.report.stories import answer
+from holobench_eval.report.stories.comparison import lacking
 from holobench_eval.study.folders import FILES
 from holobench_eval.study.folders.pairing import UNKNOWN
 from tests.support.synthetic_study import cell, layout, record, study
@@ -47,9 +47,9 @@ def test_methods_that_lack_targets_are_told_though_others_are_complete():
     results = holed(("missing", "c", "t1", "no capture"), ("missing", "b", "t1", "no"), ("missing", "c", "t3", "no"))
     said = lacking(results)
     assert "b lacks 1 of 4 targets (t1), c lacks 2 of 4 targets (t1, t3). Add the captures that are missing" in said
-    answer = kind_of(results).answer(results)
-    assert said in answer
-    assert answer[0] == "a leads (20.00 dB)."  # though the mean of c is higher
+    verdicts = answer(results)
+    assert said in verdicts
+    assert verdicts[0] == "a leads (20.00 dB)."  # though the mean of c is higher
     assert lacking(holed()) == ""
 
 
@@ -58,9 +58,9 @@ def test_a_method_without_any_score_does_not_stand_in_the_way_of_a_ranking_of_th
     said = lacking(holed(*nothing, ("failed", "b", "t0", "too faint")))
     assert "c lacks all 4 targets" in said
     assert "rank all that have any score by the 3 targets left" in said
-    answer = kind_of(holed(*nothing)).answer(holed(*nothing))
-    assert "c" not in answer[0].split()
-    assert "c lacks all 4 targets" in answer[1]
+    verdicts = answer(holed(*nothing))
+    assert "c" not in verdicts[0].split()
+    assert "c lacks all 4 targets" in verdicts[1]
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,16 @@
 """Figures as they are drawn: differences in pairs, costs, sheets of stages, tiles of pictures."""
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib import colormaps
-from matplotlib.figure import Figure
 from PIL import Image
-from skimage.io import imread
 
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.charts import curves, paired, sheet, tiles
-from holobench_eval.report.charts.look.methods import REGISTRY, looks
-from holobench_eval.report.charts.sheet import draw_sheet, drawn_from, save_sheet
-from holobench_eval.report.charts.style import LARGEST, save, save_picture, slugs
 from holobench_eval.report.board import board
+from holobench_eval.report.charts import curves, look, paired, sheet, tiles
+from holobench_eval.report.charts.look import LARGEST, MEDIA, REGISTRY, drawn_for, save, save_picture, slugs
+from holobench_eval.report.charts.sheet import draw_sheet, drawn_from, save_sheet
 from tests.support import budget_study as budget
 from tests.support import synthetic_study as synthetic
 
@@ -27,9 +22,14 @@ def found():
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """The figures that are written, as they are before that."""
+    """The figures that are written."""
     figures = []
-    monkeypatch.setattr(paired, "save", lambda figure, path: figures.append(figure))
+
+    def noted(figure, path):
+        figures.append(figure)
+        save(figure, path)
+
+    monkeypatch.setattr(look, "save", noted)
     return figures
 
 
@@ -95,25 +95,14 @@ def test_a_name_full_of_mathematics_stays_text(tmp_path):
     assert (tmp_path / "x.png").stat().st_size > 2000
 
 
-def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(tmp_path: Path, monkeypatch) -> None:
-    found = budget.results()
-    figures: list[Figure] = []
+def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(found, drawn, tmp_path):
     displays = board(found).displays
-
-    def noted(figure: Figure, path: Path) -> None:
-        figures.append(figure)
-        save(figure, path)
-
-    monkeypatch.setattr(curves, "save", noted)
-    curves.draw_costs(tmp_path / "x.png", displays, found.names, looks(found.names), "PSNR [dB]")
-    assert imread(tmp_path / "x.png").shape[1] == 900  # as wide as any other
-    for axes, display in zip(figures[0].axes, displays, strict=True):
+    curves.draw_costs(tmp_path / "x.png", displays, found.names, look.looks(found.names), "PSNR [dB]")
+    for axes, display in zip(drawn[0].axes, displays, strict=True):
         rows = [row for row in display.rows if row.label not in found.oracles]
-        legend = axes.get_legend()
-        assert legend is not None
-        assert {text.get_text() for text in legend.get_texts()} == {row.label for row in rows}
-        marks = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1}
-        assert {(row.photographs, row.score.mean) for row in rows} <= marks
+        assert {text.get_text() for text in axes.get_legend().get_texts()} == {row.label for row in rows}
+        places = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1}
+        assert {(row.photographs, row.score.mean) for row in rows} <= places
 
 
 @pytest.mark.parametrize(
@@ -144,8 +133,7 @@ def test_a_sheet_shows_blaze_and_zero_order_and_no_part_is_blank(tmp_path, monke
 
 
 def test_a_sheet_says_what_it_was_drawn_from(tmp_path, monkeypatch):
-    for part in ("_panel_stages", "_field_stages", "_chart", "_effects"):
-        monkeypatch.setattr(f"holobench_eval.report.charts.sheet.{part}", lambda *_: None)
+    monkeypatch.setattr(sheet, "_Sheet", lambda *_: type("Empty", (), {"draw": lambda self: None})())
     profile = type("Profile", (), {"name": "x", "version": 1, "description": "a bench"})
     workbench = type("Workbench", (), {"bench": type("Bench", (), {"profile": profile})})
     assert drawn_from(save_sheet(workbench, "note", tmp_path / "sheet.png", "its source")) == "its source"
@@ -174,10 +162,6 @@ def test_a_page_of_speckle_keeps_colours_at_full_resolution_and_stays_small(tmp_
         assert {layer[1:3] for layer in picture.layer} == {(1, 1)}
 
 
-def test_targets_of_a_large_study_are_spread_from_first_to_last():
-    assert tiles.spread([str(n) for n in range(21)], 5) == ["0", "5", "10", "15", "20"]
-
-
 def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(tmp_path):
     target, capture = noise(200), noise(200, seed=1)
     shown = (
@@ -190,12 +174,6 @@ def test_captures_are_in_the_figure_pixel_by_pixel_and_an_absent_one_is_a_note(t
     assert np.abs(first - capture).max() < 1 / 255
     assert 0.85 < np.median(second) < 0.95
     assert second.min() < 0.3
-
-
-def test_small_captures_are_enlarged_by_a_whole_factor():
-    assert tiles.tile_size((64, 64, 3)) == (192, 192)
-    assert tiles.tile_size((150, 100)) == (300, 200)
-    assert tiles.tile_size((300, 400)) == (300, 400)
 
 
 def test_gray_thumbnails_are_read_as_colour_and_damaged_ones_are_as_absent(tmp_path):
@@ -226,7 +204,24 @@ def test_the_window_is_drawn_at_four_times_the_scale_with_its_own_error_beside(t
     assert np.abs(drawn - colours.repeat(4, axis=0).repeat(4, axis=1)).max() < 2 / 255
 
 
-def test_the_error_scale_is_a_round_number_above_most_errors():
-    assert tiles.error_limit([np.full((4, 4), 0.23)]) == pytest.approx(0.3)
-    assert tiles.error_limit([np.zeros((4, 4))]) == pytest.approx(0.1)
-    assert tiles.error_limit([np.ones((4, 4))]) == 1.0
+def test_a_column_has_names_above_the_dots_and_the_plot_its_width(found, drawn, tmp_path):
+    with drawn_for(MEDIA["column"]):
+        paired.draw(found, "leto-aged", tmp_path / "paired.png")
+        curves.draw_costs(
+            tmp_path / "costs.png", board(found).displays[:1], found.names, look.looks(found.names), "PSNR [dB]"
+        )
+    for figure in drawn:
+        assert figure.axes[0].get_position().width > 0.8
+    assert "hil" in {text.get_text() for text in drawn[0].axes[0].texts}
+
+
+def test_a_slide_names_methods_above_and_scores_below_their_captures(drawn, tmp_path):
+    row = [("a_method_with_a_long_name", tiles.Tile(noise(64), "PSNR 7.00 dB")), ("lost", tiles.Tile(None, "failed"))]
+    rows = {"first": (noise(64), row), "second": (noise(64), row)}
+    with drawn_for(MEDIA["talk"]):
+        tiles.draw_wall(tmp_path / "slide.png", "A question?", "bench", rows)
+    assert tiles.load_picture(tmp_path / "slide.png").shape == (720, 1280, 3)
+    above = [axes.get_title().replace("\n", "") for axes in drawn[0].axes]
+    assert above == ["target", "a_method_with_a_long_name", "lost", "", "", ""]
+    below = [axes.get_xlabel() for axes in drawn[0].axes]
+    assert below == ["first", "PSNR 7.00 dB", "failed", "second", "PSNR 7.00 dB", "failed"]

@@ -8,8 +8,18 @@ from matplotlib.colors import to_rgb
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from holobench_eval.core import plugins
-from holobench_eval.report.charts.look.medium import MEDIA, SCREEN, drawn_for, medium
-from holobench_eval.report.charts.look.methods import BLACK, HUES, NEUTRAL, REGISTRY, look, looks
+from holobench_eval.report.charts.look import (
+    BLACK,
+    HUES,
+    MEDIA,
+    NEUTRAL,
+    REGISTRY,
+    SCREEN,
+    drawn_for,
+    look,
+    looks,
+    medium,
+)
 
 # Machado, Oliveira & Fernandes, IEEE TVCG 15 (2009), severity 1, on linear RGB.
 SEEN = {

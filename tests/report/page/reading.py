@@ -46,19 +46,36 @@ class ReportReader(Reader):
 
     def open(self, rest: str = "") -> "ReportReader":
         super().open(rest)
-        self.page.wait_for_function("() => document.getElementById('panes').getAttribute('aria-label')")
+        return self.drawn()
+
+    def drawn(self) -> "ReportReader":
+        """All pictures of the wall are there."""
+        self.page.wait_for_function("() => Number(document.getElementById('wall').dataset.drawn) === drawing")
         return self
 
-    def methods(self) -> list[str]:
-        found = self.page.eval_on_selector_all(
-            "#rows > tbody > tr:not(.opened) > th > button", "all => all.map(one => one.lastChild.textContent)"
-        )
-        return list(map(str, found))
+    def choose(self, **values: str) -> "ReportReader":
+        """Take a value of each of these lists."""
+        for name, value in values.items():
+            self.page.select_option(f"#{name}", value)
+        return self.drawn()
 
-    def canvas(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        """The pixels of the viewer as they are seen, ``(h, w, channels)``."""
-        return np.asarray(Image.open(io.BytesIO(self.page.locator("#panes").screenshot())))
+    def methods(self) -> list[str]:
+        """The rows of the board."""
+        return self._texts("#rows tr[data-method]", "dataset.method")
+
+    def tiles(self) -> list[str]:
+        """What each picture of the wall is of."""
+        return self._texts("#wall figcaption", "innerText")
+
+    def _texts(self, selector: str, key: str) -> list[str]:
+        return list(map(str, self.page.eval_on_selector_all(selector, f"all => all.map(one => one.{key})")))
+
+    def picture(self, label: str) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """The pixels of the first picture of a method as they are seen, ``(h, w, channels)``."""
+        frame = self.page.locator(f'#wall canvas[aria-label^="{label}"]').first.locator("..")
+        return np.asarray(Image.open(io.BytesIO(frame.screenshot())))
 
     def view(self) -> str:
+        """The address after a pause."""
         self.page.wait_for_timeout(DELAY)
         return str(self.page.evaluate("() => location.hash"))

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from holobench_eval.core.device import CPU, repeatable
-from holobench_eval.report.sections.setup import environment
+from holobench_eval.report.stories.overview import environment
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Local, Serial, executor

@@ -9,9 +9,8 @@ import pytest
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.report import layout_of
-from holobench_eval.report.data.error_budget import Budget, budgets
-from holobench_eval.report.results import Results
-from holobench_eval.report.results import records_frame
+from holobench_eval.report.results import Results, records_frame
+from holobench_eval.report.stories.error_budget import Budget, budgets
 from holobench_eval.study.config import load_study
 from tests.study.studies import write_ideal_green
 from tests.support.studies.trained_study import computed, write

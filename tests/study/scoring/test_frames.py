@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from holobench_eval.report import layout_of, records_frame
-from holobench_eval.report.data import columns
+from holobench_eval.report import columns, layout_of, records_frame
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute
 
