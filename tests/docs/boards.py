@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from holobench_eval.commands.reports.report import load
-from holobench_eval.report import Results, layout_of, records_frame
+from holobench_eval.report import Results, facts_of, records_frame
 from holobench_eval.report.charts.tiles import Thumbnails, draw_rows
 
 ROOT = Path(__file__).parents[2]
@@ -65,8 +65,8 @@ def apart(row: dict[str, Any]) -> str:
 def draw_picture(study: str, display: str) -> None:
     """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of differences nearest the table's."""
     planned, records, folder, *_ = load(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)
-    layout = layout_of(planned)
-    results = Results(records_frame(records, layout), layout)
+    facts = facts_of(planned)
+    results = Results(records_frame(records, facts), facts)
     baseline, *others = (results.values(label, display) for label in SHOWN)
     kept = Thumbnails(results, folder)
 

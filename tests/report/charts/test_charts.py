@@ -75,8 +75,8 @@ def test_a_hole_is_counted_in_the_name_of_its_row(drawn, tmp_path):
     records = budget.study()
     lost = next(i for i, record in enumerate(records) if record["label"] == "hil")
     records[lost] = records[lost] | {"state": "failed", "scores": {}}
-    layout = budget.layout()
-    paired.draw(Results(records_frame(records, layout), layout), "leto-aged", tmp_path / "x.png")
+    facts = budget.facts()
+    paired.draw(Results(records_frame(records, facts), facts), "leto-aged", tmp_path / "x.png")
     assert f"hil, {len(budget.TARGETS) - 1} of {len(budget.TARGETS)} targets" in names(drawn[0].axes[0])
 
 
