@@ -114,10 +114,10 @@ def _best(results: Results, display: Display) -> Iterator[str]:
     groups = {(rows[0].category, rows[0].frames > 1): rows for rows in complete}
     single = [rows for (category, several), rows in groups.items() if category not in (ONLINE, ORACLE) and not several]
     first = max(single, key=lambda rows: results.headline.sign * rows[0].score.mean, default=[])
-    blind = [] if first is groups.get((OPEN_LOOP, False)) else groups.get((OPEN_LOOP, False), [])
+    blind = groups.get((OPEN_LOOP, False), []) if first is groups.get((CALIBRATED, False)) else []
     places = (
         (first, f"Best{_among(results, first)}"),
-        (blind if first is groups.get((CALIBRATED, False)) else [], "Without a camera"),
+        (blind if blind and blind[0].test else [], "Without a camera"),
         (groups.get((OPEN_LOOP, True), []), "With several frames"),
         (groups.get((ONLINE, False), []), "With photographs of the picture itself"),
     )
