@@ -27,6 +27,7 @@ from ..text import grouped, percent, words
 
 ORDER = 60
 QUESTION = "What does a change of the display cost each method?"
+TESTS = False
 SMALL = 1.0  # dB; a mean loss up to this is called small, as in the acceptance test of a moved image
 LIMITS = (
     "Changes: methods are prepared before a change; models and rates of the changes are assumed. A claim holds if the "

@@ -178,7 +178,7 @@ def test_weights_that_a_method_of_the_question_learned_without_stand_among_the_l
     keep(tmp_path, "unet")
 
     asked, other = (
-        "\n".join(limits(report_of(records, tmp_path, question=question))[1])
+        "\n".join(limits(report_of(records, tmp_path, question=question)))
         for question in ("Is HIL better than U-Net?", "Is U-Net better?")
     )
     assert "**Weights:** without VGG-19 weights, which this machine has not, learned HIL." in asked
