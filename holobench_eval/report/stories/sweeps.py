@@ -218,9 +218,11 @@ def _recovered(results: Results, here: list[list[Point]]) -> Iterator[str]:
         if kind in known and "eye" in known:
             shares = sorted(recovered(results, known["eye"], known[kind]), key=lambda share: share.mean)
             ends = " to ".join(dict.fromkeys(map(percent, shares[:1] + shares[-1:])))
-            parts += [f"{ends} % with {KINDS[kind].words}"] if ends else [f"no eye loses more than {SMALL:g} dB"]
+            parts += [f"{ends} % with {KINDS[kind].words}"] * bool(ends)
     if parts:
-        yield f"Of the loss comes back: {'; '.join(dict.fromkeys(parts))}."
+        yield f"Of the loss comes back: {'; '.join(parts)}."
+    elif known.keys() & {*REMEDIES}:
+        yield f"No eye loses more than {SMALL:g} dB."
 
 
 def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[Estimate]:
