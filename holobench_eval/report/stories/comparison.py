@@ -134,7 +134,7 @@ def _best(results: Results, display: Display) -> Iterator[str]:
                 is_known = rows is first and verdict(results.headline, row.test) != UNSHOWN
                 parts.append(f"{difference(results.headline, row.test.estimate) if is_known else mean}{against}")
                 told = verdict(results.headline, row.test)
-                parts += [{UNSHOWN: UNSHOWN, "not tested": "untested"}[told]] * (told in (UNSHOWN, "not tested"))
+                parts += {UNSHOWN: [UNSHOWN], "not tested": ["untested"]}.get(told, [])
                 against = ""
             parts += [row.camera.replace(" ", " photographs ", 1)] if row.photographs else []
             yield f"{where}: {', '.join(parts)}."

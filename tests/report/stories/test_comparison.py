@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holobench_eval.report import Results
-from holobench_eval.report.board import board
+from holobench_eval.report.board import GROUPS, board
 from holobench_eval.report.facts import CALIBRATED, OPEN_LOOP
 from holobench_eval.report.stories import answer, comparison, prediction, story_of
 from holobench_eval.report.story import subjects
@@ -30,7 +30,7 @@ def test_a_network_that_was_trained_without_photographs_stands_among_those_witho
     results = results_of(means, None, {"trained": 5}, trained=networks, blind=frozenset({"net"}))
     assert answer(results) == ["Best: net, 18.05 dB, +1.00 dB [+1.00, +1.00] against old."]
     groups = {row.label: group for display in board(results).displays for group, rows in display.groups for row in rows}
-    assert groups == {"net": OPEN_LOOP, "old": OPEN_LOOP, "trained": CALIBRATED}
+    assert groups == {"net": GROUPS[OPEN_LOOP], "old": GROUPS[OPEN_LOOP], "trained": GROUPS[CALIBRATED]}
 
 
 @pytest.mark.parametrize(

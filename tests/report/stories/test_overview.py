@@ -41,7 +41,7 @@ def test_a_report_is_question_answer_board_plot_pictures_and_limits(page: str) -
         "# Made-up captures",
         "Is HIL &lt;script>",
         "## Answer",
-        "| A | Wirtinger |",
+        "| Wirtinger | ",
         "(figures/quality-paired-leto-aged.png)",
         "(figures/answer-pictures.jpg)",
         "## Limits",
