@@ -302,8 +302,9 @@ def _described(report: Report, _: Figures) -> Blocks:
         own = _flat(cell["params"])
         first, others = firsts.setdefault(cell["method"], (label, own))
         changed = {name: value for name, value in own.items() if label == first or value != others.get(name)}
+        given = plain(changed).replace(" = ", "=")
         limit = f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
-        rows.append([label, code(cell["method"]), f"{f'as {first}: ' * (label != first)}{plain(changed)}{limit}"])
+        rows.append([label, code(cell["method"]), f"{f'as {first}: ' * (label != first)}{given}{limit}"])
     yield table(["method", "registered as", "parameters"], rows)
 
 

@@ -56,11 +56,7 @@ def _controls(results: Results, condition: str) -> Iterator[str]:
         for first in results.ranking(condition, score.key)[:1]:
             own, most = (results.values(first, condition, key).mean() for key in (score.key, MOST))
             best = results.ranking(condition)[0]
-            who = (
-                "It also answers a changed hologram best"
-                if first == best
-                else f"To a changed hologram, {first} answers best"
-            )
+            who = "It answers changed holograms best" if first == best else f"Changed holograms {first} answers best"
             yield f"{who}: control {score.number(own)} of {score.number(most)}."
 
 

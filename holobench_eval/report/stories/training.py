@@ -120,11 +120,12 @@ def _ends(values: Sequence[float]) -> str:
 
 def _estimated(learned: Sequence[Training]) -> Iterator[str]:
     """How many quantities of a display each model estimates as well as it states, and what it cannot represent."""
-    for training in learned:
-        of = f"{training.name.removesuffix(f' on {training.display}')} on {training.display}"
-        lacks = training.fact("missing", list, [])
-        if rows := list(estimates(training)):
-            yield f"{of}: {verdict(rows)} {len(lacks)} effects of the display are outside its form."
+    known = ((each.labels, (each, rows)) for each in learned if (rows := list(estimates(each))))
+    for labels, same in grouped(known).items():
+        each = [
+            f"{within(rows)} on {t.display} ({len(t.fact('missing', list, []))} effects unknown)" for t, rows in same
+        ]
+        yield f"Within their stated errors, of what {words(list(labels))} estimates: {', '.join(each)}."
 
 
 def _doubts(learned: Sequence[Training]) -> Iterator[str]:
@@ -175,18 +176,10 @@ def _number(value: object) -> float:
     return math.nan
 
 
-def verdict(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Whether the numbers are as near to the truth as is stated."""
+def within(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many numbers are as near to the truth as is stated, of those that have a truth and a stated error."""
     judged = [row for row in rows if not math.isnan(row["apart"] + row["error"])]
-    if not judged:
-        return "None of these has a ground truth and a stated error to compare with."
-    outside = [row["name"].replace("_", " ") for row in judged if row["apart"] > row["error"]]
-    if not outside:
-        return f"All {len(judged)} numbers are within their stated errors."
-    return (
-        f"{len(judged) - len(outside)} of {len(judged)} numbers are within their stated errors; outside: "
-        f"{', '.join(dict.fromkeys(outside))}."
-    )
+    return f"{sum(row['apart'] <= row['error'] for row in judged)} of {len(judged)} numbers"
 
 
 PARTS = (Part(100, _render, applies=lambda report: bool(report.once(trainings)), figures=_figures, details=True),)
