@@ -22,7 +22,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
@@ -260,11 +259,7 @@ def pictures(
     first on the displays, then on each changed display; then target by target all. A target comes with its captures.
     """
     results, kept = report.results, dict[Cell, bytes]()
-    names = [*results.conditions, *results.changed]
-    tables = [pd.DataFrame([results.values(label, name) for label in results.methods(name)]) for name in names]
-    between = pd.concat([values - values.mean() for values in tables])
-    away = between.sub(between.mean(axis=1), axis=0).abs().mean()
-    near = [results.targets[index] for index in away.sort_values(kind="stable").index]
+    names, near = [*results.conditions, *results.changed], results.near
     wanted = [(target, results.conditions) for target in near[:FIRST]]
     wanted += [(target, [name]) for target in near[:FIRST] for name in results.changed]
     for target, these in [*wanted, *((target, names) for target in near)]:

@@ -5,7 +5,7 @@ report.md has the first page and the limits; details.md has the setup, the paire
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,15 +61,19 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     """A target, and its captures by the methods that are ``chosen``."""
     results, thumbnails, text = report.results, report.thumbnails, report.results.text
     for condition in [name for name in results.conditions if results.has_pictures(name)][:1]:
-        known = thumbnails.targets(condition)
-        target = thumbnails.middle(condition) if known else ""
-        labels = chosen(results, condition) if known else []
-        tiles = [(report.results.facts.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
-        if any(tile.picture is not None for _, tile in tiles):
-            middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
-            which, path = f"{text.scored.capitalize()}s of {target}{middle}", report.figures / PICTURES
-            draw_rows(path, condition, (target, known[target]), [("", tiles)])
+        labels = chosen(results, condition)
+        for target in thumbnails.typical(labels, condition)[:1]:
+            tiles = [(results.facts.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
+            typical = ", whose differences between methods are nearest to the mean" if len(results.targets) > 1 else ""
+            which, path = f"{text.scored.capitalize()}s of {target}{typical}", report.figures / PICTURES
+            draw_rows(path, condition, (target, thumbnails.targets(condition)[target]), [("", tiles)])
             yield path, f"{which}, on {condition}. {text.picture}. Left: the {text.truth}."
+
+
+def _typical(report: Report) -> Iterable[tuple[Path, str]]:
+    """The row of pictures, from the small copies where the records are not there; else that of an earlier report."""
+    drawn = [] if report.drawn else list(_pictures(report))
+    return drawn or report.pictures(PICTURES, lambda report: [])
 
 
 def chosen(results: Results, condition: str) -> list[str]:
@@ -400,7 +404,7 @@ PARTS = (
     ANSWER,
     Part(3, _table, applies=_has_scores),
     Part(4, applies=_has_plot, figures=lambda report: _plots(report, slice(1))),
-    Part(6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
+    Part(6, applies=_has_scores, figures=_typical),
     LIMITATIONS,
     Part(210, _reproduce),
     Part(1, _details, details=True),

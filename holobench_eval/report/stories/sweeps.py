@@ -272,11 +272,12 @@ def _curves(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
-    """Rows of pictures of the target in the middle of their ranking by quality, a row a chosen method."""
+    """Rows of pictures of the target whose differences between methods are nearest to the mean, a row a method."""
     results, thumbnails, stems = report.results, report.thumbnails, slugs(report.results.conditions)
-    if not thumbnails.targets(results.conditions[0]):
+    known, swept = thumbnails.targets(results.conditions[0]), sweeps(results)
+    if not known:
         return
-    target, swept = thumbnails.middle(results.conditions[0]), sweeps(results)
+    target = next(name for name in results.near if name in known)
     for display, kind in dict.fromkeys((display, kind) for display, kind, _ in swept):
         ranked = results.ranking(display, categories=(*OFFLINE, ONLINE))
         rows = [
