@@ -42,11 +42,8 @@ def test_opening_asks_for_the_file_alone_and_shows_markup_in_names_as_text(reade
     assert HOSTILE in row.inner_text()
 
 
-def test_the_page_begins_with_the_question(reader: ReportReader) -> None:
+def test_one_chooser_below_the_question_moves_sentence_board_wall_and_charts(reader, written) -> None:
     assert reader.page.inner_text("h1").endswith("?")
-
-
-def test_one_chooser_moves_sentence_board_wall_and_charts(reader: ReportReader, written: Written) -> None:
     charts = "all => all.filter(one => !one.hidden).map(one => one.dataset.name)"
     for display, other in (("ideal", "leto-aged"), ("leto-aged", "ideal")):
         reader.choose(display=display)
