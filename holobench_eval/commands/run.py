@@ -19,11 +19,11 @@ from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import yaml
 
 from ..core.errors import UserError, one_line
 from ..core.io import read_regular
 from ..core.panels import is_small
+from ..core.parts import divided, load_config
 from ..core.yaml_source import LARGEST_BYTES
 from . import options
 from .output import console as open_console
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..study.definition import Study
     from ..study.displays import Condition
     from ..study.executors import Executor
+    from ..study.running.run import Outcome
 
 INTERRUPTED = 130
 
@@ -56,9 +57,11 @@ def run(
     train: Annotated[bool, typer.Option("--train/--no-train", help="Train what is not trained, or refuse it.")] = True,
     artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
-    """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
+    """Compute what is missing of a study and its parts, and write their reports.
 
-    With --methods, --targets, --limit or --set, a part or a variant of the study is run, and its report says so.
+    A stopped run goes on with the same command.
+    With --methods, --targets, --limit or --set, some of the study or a variant is run, and its report says so. These
+    and --retrain leave the parts out.
     """
     changes = options.changes_of(methods, targets, limit, values)
     with resumable():
@@ -67,51 +70,64 @@ def run(
 
             begin(executor, workers, is_small(_panel(config)))
         from ..study.artifacts import Artifacts
-        from ..study.config import load_study
         from ..study.plan import plan
         from ..study.running.progress import watching
         from ..study.running.run import run as compute
         from ..study.training import keep_training_records
 
-        console, study = open_console(), load_study(config, changes)
-        device, where = _where(study, device, executor, workers, address)
-        open_displays(study)
-        folder, grid = options.output_folder(study, output), plan(study)
-        artifacts = options.learned_folder(artifacts, grid)
-        if word := replaced(study, folder):
-            console.print(word, markup=False, soft_wrap=True)
-        many = options.thread_count(threads, where.workers, study)
-        how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
-        drawings = sheets(study, folder)
-        beside = drawings if where.workers > 1 else []
-        if where.workers > 1:  # meanwhile this process only waits
-            Thread(target=import_module, args=("holobench_eval.report",), daemon=True).start()
-        with watching(console) as watch:
-            outcome = compute(study, grid, folder, where, watch, many, artifacts, drawings=beside, **how)
-        keep_training_records(grid, Artifacts(artifacts), folder)
-        draw_sheets(drawings, options.thread_count(threads, 1, study))
-        write_report(console, study, outcome.records, folder, outcome.provenance)
-    if outcome.failed:
-        console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
-        console.print(f"reasons: {folder}/details.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
+        outcomes: list[tuple[Study, Path, Outcome]] = []
+        console = open_console()
+        studies = options.studies(config, output, changes)[: 1 if retrain else None]
+        places = [_where(study, device, executor, workers, address) for study, _ in studies]
+        for study, _ in studies:
+            open_displays(study)
+        for (study, folder), (named, where) in zip(studies, places, strict=True):
+            grid = plan(study)
+            learned = options.learned_folder(artifacts, grid)
+            if word := replaced(study, folder):
+                console.print(word, markup=False, soft_wrap=True)
+            many = options.thread_count(threads, where.workers, study)
+            how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": named}
+            drawings = sheets(study, folder)
+            beside = drawings if where.workers > 1 else []
+            if where.workers > 1:  # meanwhile this process only waits
+                Thread(target=import_module, args=("holobench_eval.report",), daemon=True).start()
+            with watching(console) as watch:
+                outcome = compute(study, grid, folder, where, watch, many, learned, drawings=beside, **how)
+            keep_training_records(grid, Artifacts(learned), folder)
+            draw_sheets(drawings, options.thread_count(threads, 1, study))
+            write_report(console, study, outcome.records, folder, outcome.provenance)
+            outcomes.append((study, folder, outcome))
+        if len(studies) > 1:  # the answers of its parts were not there yet
+            from ..report import build_report
+
+            study, folder, outcome = outcomes[0]
+            build_report(study, outcome.records, folder, outcome.provenance)
+    for _, folder, outcome in outcomes:
+        if outcome.failed:
+            console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
+            reasons = f"reasons: {folder}/details.md, tracebacks: {folder}/records/*.log"
+            console.print(reasons, markup=False, soft_wrap=True)
+    if any(outcome.failed for *_, outcome in outcomes):
         raise typer.Exit(1)
 
 
 def _panel(config: Path) -> tuple[int, int] | None:
     """The panel in a config that nobody has checked yet, without the libraries that check it; None if there is none."""
     try:
-        rows, columns = yaml.safe_load(read_regular(config, LARGEST_BYTES))["display"]["panel"]
+        rows, columns = load_config(config).data["display"]["panel"]
         return int(rows), int(columns)
-    except (UserError, OSError, ValueError, TypeError, LookupError, ArithmeticError, yaml.YAMLError):
+    except (UserError, ValueError, TypeError, LookupError, ArithmeticError):
         return None
 
 
 def _is_finished(config: Path, output: Path | None) -> bool:
     """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
     try:
-        known = (output or options.RESULTS / config.stem) / "provenance.json"
+        file, part = divided(config)
+        known = (output or options.RESULTS / file.stem / part) / "provenance.json"
         described = json.loads(read_regular(known, 2 * LARGEST_BYTES))
-        text = hashlib.sha256(read_regular(config, LARGEST_BYTES)).hexdigest()
+        text = hashlib.sha256(load_config(config).text.encode()).hexdigest()
         return bool(described["ended"] and described["config_sha256"] == text)
     except (UserError, OSError, ValueError, TypeError, LookupError):
         return False

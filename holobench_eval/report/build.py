@@ -53,7 +53,7 @@ def write_report(
     keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its layout and description."""
-    results = Results(records_frame(records, layout), layout, related(layout, output.parent))
+    results = Results(records_frame(records, layout), layout, related(layout, output))
     report = Report(results, records, output, provenance, description, keep_pictures)
     write_files(results, output)
     for pattern in OF_NUMBERS if keep_pictures else (*OF_PICTURES, *OF_NUMBERS):
@@ -86,7 +86,7 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 
 def related(layout: Layout, folder: Path) -> dict[str, Results]:
-    """Results of the related studies that have a report of their name in a folder."""
+    """Results of the parts that predict, where they have a report in the folder of their study."""
     known = {name: folder / name / "records.csv" for name in layout.related}
     return {
         name: Results(of_study(read_records(records_text(path)), layout.related[name]), layout.related[name])

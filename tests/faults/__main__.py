@@ -1,4 +1,4 @@
-"""Run the campaigns of faults and write ``reports/faults/report.md``: ``python -m tests.faults --hours 0.25``."""
+"""Run the campaigns of faults and write ``build/faults/report.md``: ``python -m tests.faults --hours 0.25``."""
 
 import argparse
 import random
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tests.faults.campaign import KINDS, Count, study, without_fault
 
-REPORT = Path(__file__).parents[2] / "reports/faults/report.md"
+REPORT = Path(__file__).parents[2] / "build/faults/report.md"
 FAULTS_A_STUDY = 6
 
 

@@ -1,7 +1,7 @@
 """Fuzz what reads files from outside: ``python -m tests.fuzz --seconds 60 [TARGET...]``, with atheris.
 
 Each target runs in a process of its own, guided by the coverage of the package, under a limit of 1 GiB and of ten
-seconds an input. A table goes to ``reports/fuzz/report.md``; an input that breaks a target is kept beside it.
+seconds an input. A table goes to ``build/fuzz/report.md``; an input that breaks a target is kept beside it.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-REPORT = ROOT / "reports/fuzz"
+REPORT = ROOT / "build/fuzz"
 
 
 def fuzz(name: str, corpus: Path, seconds: int) -> None:

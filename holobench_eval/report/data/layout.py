@@ -110,8 +110,8 @@ class Layout:
     each target is its own). metrics: names of those the study wants (None: all). study: its name, the config's file
     without the ending; params: every parameter of a method, by label; capture_limits: the most captures that a display
     allows a method for a target, by label; panels: rows and columns of the panel of each display [px]; shapes: of the
-    targets as each display is to show them, ``(C, h, w)``; profiles: of simulated displays; related: layouts of related
-    studies, by their names.
+    targets as each display is to show them, ``(C, h, w)``; profiles: of simulated displays; related: layouts of the
+    parts that predict, by their names; parts: names of all parts.
     """
 
     title: str
@@ -151,6 +151,7 @@ class Layout:
     shapes: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     profiles: Mapping[str, Profile] = field(default_factory=dict)
     related: Mapping[str, Layout] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
 
     def category(self, label: str) -> str:
         """The category that a method competes in."""
@@ -278,7 +279,12 @@ def layout_of(study: Study) -> Layout:
         panels={condition.name: condition.spec.shape for condition in conditions.values()},
         shapes={each.name: (len(each.spec.wavelengths), *each.spec.region.shape) for each in conditions.values()},
         profiles=profiles,
-        related={name: layout_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
+        related={
+            name: layout_of(load_study(study.file / name))
+            for name, keys in study.parts.items()
+            if keys.get("measure") in PREDICTIONS and not study.predicts
+        },
+        parts=() if study.changes else tuple(study.parts),
     )
 
 

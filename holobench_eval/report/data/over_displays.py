@@ -155,7 +155,7 @@ class Map:
 
 
 def display_map(results: Results) -> Map | None:
-    """The map from the first error budget among the related studies that has all displays; None without one."""
+    """The map from the first error budget among the parts that has all displays; None without one."""
     where = shown_on(results)
     for other in results.related.values():
         known = {budget.condition: budget for budget in budgets(other)}
@@ -185,7 +185,7 @@ def left_out(shares: Array, values: Array) -> Array:
 def judged(results: Results) -> dict[str, tuple[int, int]]:
     """How often control and prediction of models name the better of two methods that optimise through them.
 
-    From the related study that measured both: right ones and pairs over displays, by the title of the score.
+    From the part that measured both: right ones and pairs over displays, by the title of the score.
     """
     found, told = {each.label: each for each in margins(results)}, dict[str, tuple[int, int]]()
     models = (one for one in results.related.values() if one.layout.measure == "prediction" and one.control)

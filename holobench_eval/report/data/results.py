@@ -25,7 +25,7 @@ LEADING = ("psnr", "ssim", "ms_ssim", "lpips_alex", "lpips_vgg", "mofd", control
 
 @dataclass(frozen=True)
 class Results:
-    """A records frame with the layout of its study, see ``tables.records_frame``, and results of related studies."""
+    """A records frame with the layout of its study, see ``tables.records_frame``, and those of parts that predict."""
 
     frame: pd.DataFrame
     layout: Layout

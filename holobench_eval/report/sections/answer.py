@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from ...core.errors import UserError
+from ...core.io import read_text
 from ..answers import kind_of
 from ..answers.limits import FIRST, limits
 from ..data.results import Results
-from ..data.tables import DONE
+from ..data.tables import DONE, MOST_BYTES
 from ..data.text import FILES
-from ..markdown import Markdown, beginning, bullets, code_block, heading
+from ..markdown import REPORT, Markdown, beginning, bullets, code, code_block, heading
 from ..section import Blocks, Figures, Report, Section
 
 
@@ -18,6 +20,27 @@ def _title(report: Report, _: Figures) -> Blocks:
 def _answer(report: Report, _: Figures) -> Blocks:
     yield heading("Answer")
     yield bullets(kind_of(report.results).answer(report.results))
+
+
+def _parts(report: Report, _: Figures) -> Blocks:
+    """The question and the answer of each part, as its own report begins."""
+    yield heading("Parts")
+    run = report.description.config_file or "CONFIG.yaml"
+    for name in report.layout.parts:
+        path = report.output / name / REPORT
+        try:
+            title, question, headed, answer, *_ = read_text(path, MOST_BYTES).split("\n\n")
+            if (title[:2], headed) != ("# ", heading("Answer")):
+                raise ValueError
+            yield heading(Markdown("[{}]({}/{})").format(Markdown(title[2:]), name, REPORT), 3)
+            yield from (Markdown(question), Markdown(answer))
+        except FileNotFoundError:
+            yield Markdown("No report of the part {} is here: {} makes it.").format(
+                name, code(f"holoeval run {run}/{name}")
+            )
+        except (UserError, OSError, ValueError):
+            again = code(f"holoeval report {run}/{name}")
+            yield Markdown("The report of the part {} has no answer: {} writes it again.").format(name, again)
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
@@ -65,6 +88,7 @@ def _has(report: Report) -> bool:
 SECTIONS = (
     Section("title", 0, _title),
     Section("answer", 2, _answer, applies=_has),
+    Section("parts", 74, _parts, applies=lambda report: bool(report.layout.parts)),
     Section("limits", 75, _limits, applies=_has),
     Section("reproduce", 210, _reproduce),
     Section("more limits", 5, _more_limits, applies=_has, details=True),

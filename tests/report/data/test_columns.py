@@ -61,7 +61,7 @@ def test_photographs_of_failed_cells_count(cells: list[tuple[str, str, int | Non
 
 @pytest.mark.parametrize("file", ["records.csv", "table.csv", "tests.csv"])
 def test_every_column_of_the_committed_reports_has_an_entry(file: File) -> None:
-    reports = sorted(REPORTS.glob(f"*/{file}"))
+    reports = sorted(REPORTS.glob(f"**/{file}"))
     assert len(reports) > 10
     names = {name for path in reports for name in header(path)}
     assert len(names) > (10 if file == "tests.csv" else 50)
