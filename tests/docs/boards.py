@@ -2,7 +2,7 @@
 
 Between ``<!-- board: STUDY: DISPLAY, ... -->`` and ``<!-- /board -->`` stand the table and its legend; every number is
 that of ``reports/STUDY/board.json``, rounded once. ``PICTURE`` has some of its rows. Between ``<!-- timings -->`` and
-``<!-- /timings -->`` stand the times of a gradient step, those of ``tests/benchmarks/timings.json``.
+``<!-- /timings -->`` stand the times of a gradient step, those of ``reports/performance/timings.json``.
 """
 
 import json
@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from holobench_eval.commands.options import planned
+from holobench_eval.commands.options import planned as plans
 from holobench_eval.commands.reports.report import load
 from holobench_eval.report import Results, layout_of, records_frame
 from holobench_eval.report.charts.tiles import Thumbnails, draw_rows
@@ -76,8 +76,8 @@ def cells_of(row: dict[str, Any] | None) -> tuple[str, str]:
 
 def draw_picture(study: str, display: str) -> None:
     """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of scores nearest the table's."""
-    drawn_of, records, folder, *_ = load(*next(planned(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)))
-    layout = layout_of(drawn_of)
+    planned, records, folder, *_ = load(*next(plans(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)))
+    layout = layout_of(planned)
     results = Results(records_frame(records, layout), layout)
     scores = {label: results.values(label, display) for label in SHOWN}
     kept = Thumbnails(results, folder)
@@ -97,7 +97,7 @@ def draw_picture(study: str, display: str) -> None:
 
 def timings() -> str:
     """A row a version, two columns a distance: its time over that of this package, and its field's error."""
-    timed = json.loads((ROOT / "tests" / "benchmarks" / "timings.json").read_text(encoding="utf-8"))["benchmarks"]
+    timed = json.loads((ROOT / "reports" / "performance" / "timings.json").read_text(encoding="utf-8"))["benchmarks"]
     groups: dict[str, dict[str, Any]] = {}
     for row in timed:
         if row["group"].startswith(STEP):

@@ -76,9 +76,7 @@ def _read_phases(content: bytes, folder: Path) -> object:
 
 
 def _configs() -> list[bytes]:
-    return [
-        (ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("quick", "lens", "table3", "family")
-    ]
+    return [(ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("quick", "lens", "table3", "family")]
 
 
 def _profiles() -> list[bytes]:

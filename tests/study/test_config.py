@@ -96,6 +96,7 @@ STRUCTURE = [
     ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
     ("repeats: 2", "protocol: {version: v1}", "11:21: protocol.version should be 'v2'"),
     ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
+    ("repeats: 2", "parts: [a]", "11:8: parts should be a mapping of names to the keys that differ"),
 ]
 BEYOND = [  # structure: mistakes about other values, files, images and optics, which the schema cannot find
     ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
@@ -123,7 +124,6 @@ BEYOND = [  # structure: mistakes about other values, files, images and optics, 
     ("repeats: 2", "parts: {a: {sede: 3}}", "11:13: unknown key 'sede' in the document; did you mean 'seed'?"),
     ("repeats: 2", "parts: {a: {seed: -3}}", "11:19: seed should be greater than or equal to 0, got -3"),
     ("repeats: 2", "parts: {a: {title: null}}", "11:20: missing key 'title'"),
-    ("repeats: 2", "parts: [a]", "11:8: parts should be a mapping of names to the keys that differ"),
     ("repeats: 2", "protocol: {metrics: [psnr]}", "11:21: the headline is 'ssim_srgb'; add ssim to the metrics, or "),
 ]
 

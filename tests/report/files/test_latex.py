@@ -136,10 +136,10 @@ EXAMPLES = re.findall(
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The files of the leaderboard, written from its committed records, in the working folder."""
-    report = tmp_path / "reports" / "methods"
+    report = tmp_path / "reports" / "leaderboard"
     report.mkdir(parents=True)
-    records = read_records((ROOT / "reports" / "board" / "methods" / "records.csv").read_text())
-    write_files(Results(records, layout_of(load_study(ROOT / "configs" / "board.yaml" / "methods"))), report)
+    records = read_records((ROOT / "reports" / "leaderboard" / "records.csv").read_text())
+    write_files(Results(records, layout_of(load_study(ROOT / "configs" / "leaderboard.yaml"))), report)
     monkeypatch.chdir(tmp_path)
     return report
 
