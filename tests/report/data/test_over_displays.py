@@ -211,7 +211,7 @@ def test_related_studies_of_many_displays_answer_with_means_over_them() -> None:
     assert len(str(kind_of(of_errors).table(board(of_errors))).splitlines()) == 2 + 5
 
 
-def test_the_report_reads_its_related_studies_beside_it(tmp_path: Path) -> None:
+def test_the_report_reads_the_parts_that_predict_in_its_folder(tmp_path: Path) -> None:
     other = budget()
     (tmp_path / "budget").mkdir()
     write_files(other, tmp_path / "budget")
