@@ -173,12 +173,13 @@ def explain_study(screen: Console, name: str) -> None:
     """Print what a study asks, and where its config is."""
     keys, (file, _, part) = _keys(name), name.partition("/")
     _heading(screen, "studies", name, [])
-    words = {key: " ".join(keys[key].split()) for key in ("title", "question", "would_change") if key in keys}
-    if parts := ", ".join(keys.get("parts", ())) if not part else "":
-        words["parts"] = parts
-    for key, text in {**words, "config": str(shipped_configs()[file] / part), "run": f"holoeval run {name}"}.items():
+    words: dict[str, str] = {key: keys[key] for key in ("title", "question", "would_change") if key in keys}
+    if not part and "parts" in keys:
+        words["parts"] = ", ".join(keys["parts"])
+    words |= {"config": str(shipped_configs()[file] / part), "run": f"holoeval run {name}"}
+    for key, text in words.items():
         said = key.replace("would_change", "would change the answer")
-        screen.print(escape(f"{said}: {text}"), soft_wrap=key == "config")
+        screen.print(escape(f"{said}: {' '.join(text.split())}"), soft_wrap=key == "config")
 
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:

@@ -42,7 +42,7 @@ def plan(
     device: options.Device = "auto",
     artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
-    """Show what a study and its parts would compute, and what of it is done; compute nothing."""
+    """Show what a study would compute, and what of it is done; compute nothing."""
     studies = options.studies(config, output, options.changes_of(methods, targets, limit, values))
     rows = [row for study, folder in studies for row in _show(study, folder, threads, device, artifacts)]
     if len(studies) > 1:

@@ -57,11 +57,11 @@ def run(
     train: Annotated[bool, typer.Option("--train/--no-train", help="Train what is not trained, or refuse it.")] = True,
     artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
-    """Compute what is missing of a study and its parts, and write their reports.
+    """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
 
-    A stopped run goes on with the same command.
-    With --methods, --targets, --limit or --set, some of the study or a variant is run, and its report says so. These
-    and --retrain leave the parts out.
+    The parts of the study are run behind it, each into a folder of its own in that of the study.
+    With --methods, --targets, --limit or --set, some of the study or a variant of it is run, and its report says so.
+    These and --retrain leave the parts out.
     """
     changes = options.changes_of(methods, targets, limit, values)
     with resumable():

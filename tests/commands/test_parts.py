@@ -82,7 +82,7 @@ def test_a_study_and_its_parts_from_plan_to_check(config, call, in_process):
     assert call("report", config)[0] == 0
     text = (top / "report.md").read_text()
     assert "And of bars?" in text  # whose report was written again
-    assert "No report of the part one-step is here: `holoeval run toy.yaml/one-step` makes it." in text
+    assert "The part one-step has no report with an answer here: `holoeval run toy.yaml/one-step` writes one." in text
 
 
 def test_a_part_is_run_alone_with_some_of_its_methods_or_in_another_folder(config, call, in_process):
@@ -131,5 +131,5 @@ def test_a_damaged_report_of_a_part_is_told_and_costs_no_report(config, call, in
     shutil.copytree("out/records", folder / "records")
     assert call("report", config)[0] == 0
     text = (folder / "report.md").read_text()
-    assert "The report of the part bars has no answer: `holoeval report toy.yaml/bars` writes it again." in text
-    assert "No report of the part one-step is here" in text
+    assert "The part bars has no report with an answer here: `holoeval report toy.yaml/bars` writes one." in text
+    assert "`holoeval run toy.yaml/one-step` writes one." in text

@@ -29,18 +29,14 @@ def _parts(report: Report, _: Figures) -> Blocks:
     for name in report.layout.parts:
         path = report.output / name / REPORT
         try:
-            title, question, headed, answer, *_ = read_text(path, MOST_BYTES).split("\n\n")
+            title, question, headed, answer = read_text(path, MOST_BYTES).split("\n\n", 4)[:4]
             if (title[:2], headed) != ("# ", heading("Answer")):
                 raise ValueError
             yield heading(Markdown("[{}]({}/{})").format(Markdown(title[2:]), name, REPORT), 3)
             yield from (Markdown(question), Markdown(answer))
-        except FileNotFoundError:
-            yield Markdown("No report of the part {} is here: {} makes it.").format(
-                name, code(f"holoeval run {run}/{name}")
-            )
-        except (UserError, OSError, ValueError):
-            again = code(f"holoeval report {run}/{name}")
-            yield Markdown("The report of the part {} has no answer: {} writes it again.").format(name, again)
+        except (UserError, OSError, ValueError) as error:
+            command = f"holoeval {'run' if isinstance(error, FileNotFoundError) else 'report'} {run}/{name}"
+            yield Markdown("The part {} has no report with an answer here: {} writes one.").format(name, code(command))
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
