@@ -241,8 +241,8 @@ class Study:
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
     published figures to print beside the measured ones; board: whether the study enters the pages of displays on a
-    site; parts: further studies by name, each with the keys that differ from those of this study (null: without the
-    key), whose reports lie in folders of its own: a study over many displays holds margins against those that predict.
+    site; parts: further studies by name, each with the keys that differ from those of this one (null: without the key);
+    their reports lie in its folder.
     file, text: the config file as the user named it, and the keys in it; part: its name, where it is a part of another
     study; changes: those of the command line.
     """
