@@ -74,4 +74,4 @@ for column, (place, view) in enumerate(zip(places, views, strict=True)):
 
 # %%
 # These are places that the frames know. Between them they are some 5 dB worse: the
-# study ``configs/light-field.yaml`` gives methods nine views and scores others.
+# study ``depth/light-field`` gives methods nine views and scores others.
