@@ -56,7 +56,7 @@ def write_report(
     keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its facts and description."""
-    results = Results(records_frame(records, facts), facts, related(facts, output.parent))
+    results = Results(records_frame(records, facts), facts, related(facts, output))
     report = Report(results, records, output, provenance, description, keep_pictures)
     for name, text in texts(results).items():
         write_atomically(output / name, text.encode())
@@ -90,7 +90,7 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 
 def related(facts: Facts, folder: Path) -> dict[str, Results]:
-    """Results of the related studies that have a report of their name in a folder."""
+    """Results of the parts that predict, where they have a report in the folder of their study."""
     known = {name: folder / name / "records.csv" for name in facts.related}
     return {
         name: Results(of_study(read_records(records_text(path)), facts.related[name]), facts.related[name])

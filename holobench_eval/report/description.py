@@ -66,8 +66,8 @@ def describe(study: Study) -> Description:
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
-    typed = Path(as_typed(study.file))
-    file = typed.name if typed.is_absolute() else typed.as_posix()
+    typed = Path(as_typed(study.config))
+    file = (Path(study.file.name, study.part) if typed.is_absolute() else typed).as_posix()
     command = "holoeval session import with the session's folder" if study.display.session else ""
     command = f"holoeval run {shlex.quote(file)} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command, _models(study))

@@ -237,7 +237,7 @@ def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Results:
-    """A records frame with the facts of its study, see ``records_frame``, and results of related studies."""
+    """A records frame with the facts of its study, see ``records_frame``, and those of the parts that predict."""
 
     frame: pd.DataFrame
     facts: Facts

@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from holobench_eval.commands.options import planned as plans
 from holobench_eval.commands.reports.report import load
 from holobench_eval.report import Results, facts_of, records_frame
 from holobench_eval.report.charts.tiles import Thumbnails, draw_rows
@@ -63,8 +64,8 @@ def apart(row: dict[str, Any]) -> str:
 
 
 def draw_picture(study: str, display: str) -> None:
-    """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of differences nearest the table's."""
-    planned, records, folder, *_ = load(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)
+    """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of differences nearest the mean ones."""
+    planned, records, folder, *_ = load(*next(plans(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)))
     facts = facts_of(planned)
     results = Results(records_frame(records, facts), facts)
     kept = Thumbnails(results, folder)

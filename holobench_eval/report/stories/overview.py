@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from ...core.errors import UserError
+from ...core.io import read_text
 from ...study.plan import is_reference
 from ..board import board
 from ..charts import paired
 from ..charts.tiles import draw_rows
 from ..facts import FLOOR
-from ..markdown import Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
+from ..markdown import REPORT, Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
 from ..phrases import edited, remarks, too_few, uncovered
-from ..results import DONE, Results
+from ..results import DONE, MOST_BYTES, Results
 from ..statistics import FEWEST, POWER, SIGNIFICANCE
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
 from ..text import FILES, grouped, plain, sample, words
@@ -90,6 +92,23 @@ def _stages(report: Report) -> Iterator[tuple[Path, str]]:
         path = report.figures / f"stages-{name}.png"
         if path.is_file():
             yield path, f"Stages of the simulated bench {name}."
+
+
+def _parts(report: Report, _: Figures) -> Blocks:
+    """The question of each part and the beginning of its answer, as its own report has them."""
+    yield heading("Parts")
+    run, lines = report.description.config_file or "CONFIG.yaml", list[Markdown]()
+    for name in report.results.study.parts:
+        try:
+            title, question, headed, answer = read_text(report.output / name / REPORT, MOST_BYTES).split("\n\n", 4)[:4]
+            if (title[:2], headed, answer[:2]) != ("# ", heading("Answer"), "- "):
+                raise ValueError
+            told = (Markdown(text) for text in (title[2:], question, answer[2:].partition("\n")[0]))
+            lines.append(Markdown("[{}]({}/{}). {} {}").format(next(told), name, REPORT, *told))
+        except (UserError, OSError, ValueError) as error:
+            command = f"holoeval {'run' if isinstance(error, FileNotFoundError) else 'report'} {run}/{name}"
+            lines.append(Markdown("{} has no report with an answer here: {} writes one.").format(name, code(command)))
+    yield bullets(lines)
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
@@ -383,6 +402,10 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*named, *((name, str(value)) for name, value in provenance.get("packages", {}).items())]
 
 
+def _has_parts(report: Report) -> bool:
+    return bool(report.results.study.parts) and not report.results.study.changes
+
+
 def _has_displays(report: Report) -> bool:
     return bool(report.results.conditions)
 
@@ -405,6 +428,7 @@ PARTS = (
     Part(3, _table, applies=_has_scores),
     Part(4, applies=_has_plot, figures=lambda report: _plots(report, slice(1))),
     Part(6, applies=_has_scores, figures=_typical),
+    Part(74, _parts, applies=_has_parts),
     LIMITATIONS,
     Part(210, _reproduce),
     Part(1, _details, details=True),

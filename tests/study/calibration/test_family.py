@@ -119,7 +119,7 @@ def test_draws_of_other_code_are_not_resumed(small, rows, monkeypatch):
 
 def test_the_committed_report_follows_from_its_draws_and_the_displays_that_ship(tmp_path):
     """What was scored of a display stands in the head of its file."""
-    family, folder = load_family("leto-2020"), Path(__file__).parents[3] / "reports/posterior"
+    family, folder = load_family("leto-2020"), Path(__file__).parents[3] / "reports/family/posterior"
     drawn_rows = rows_of(folder / "draws.csv", families.columns_of(family))
     kept = []
     for name in profiles.names(family=True):
