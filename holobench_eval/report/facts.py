@@ -85,8 +85,8 @@ class Facts:
     and place (plane [mm], or place of the eye's pupil [radii of the iris]). pairs: (label, condition) of each planned
     row; sweeps: which conditions are changes of others; training: what methods may train on (None: nothing is trained);
     network: the display that is a trained network (empty: benches); beside: the condition that published figures stand
-    beside (empty: each); profiles: of simulated displays; related: facts of the parts that predict, by their names; changed:
-    the conditions that are a change of another, with that change.
+    beside (empty: each); profiles: of simulated displays; related: facts of the parts that predict, by their names;
+    changed: the conditions that are a change of another, with that change.
     """
 
     study: Study

@@ -236,8 +236,9 @@ class Study:
     the report leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
-    published figures to print beside the measured ones; board: whether its cards come first on a site; parts: further studies by name, each with the keys that differ from those of this one (null: without the key);
-    their reports lie in its folder.
+    published figures to print beside the measured ones; board: whether its cards come first on a site; parts: further
+    studies by name, each with the keys that differ from those of this one (null: without the key); their reports lie in
+    its folder.
     file, text: the config file as the user named it, and the keys in it; part: its name, where it is a part of another
     study; changes: those of the command line.
     """
