@@ -310,9 +310,8 @@ def test_learning_and_watching_methods_go_round_by_round_to_the_direct_scores(tm
     run("run", config, "--output", tmp_path / "direct", "--executor", "serial", "--artifacts", tmp_path / "artifacts")
     ours, direct = table(folder / "report"), table(tmp_path / "direct")
     columns = ["psnr_linear_db", "captures", "training_captures"]
-    assert ours.loc[METHODS, columns].equals(
-        direct.loc[METHODS, columns]
-    )  # to the last digit, from the same photographs
+    # From the same photographs all is learned to the last digit.
+    assert ours.loc[METHODS, columns].equals(direct.loc[METHODS, columns])
     plain, camera, model = ours.loc[METHODS, "psnr_linear_db"]
     assert camera > plain + 0.4
     assert model > plain + 2
