@@ -1,4 +1,4 @@
-"""One truth: what two committed reports say of the same thing is the same, and what a page quotes stands in a report."""
+"""One truth: two committed reports say the same of the same thing, on a page each and in few words."""
 
 import json
 from pathlib import Path
