@@ -21,8 +21,7 @@ from holobench_eval.display.simulated.pipeline import BenchSession
 from holobench_eval.lab.real import RealSession
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.report.facts import layout_of
-from holobench_eval.report.files import write_files
+from holobench_eval.report.facts import facts_of
 from holobench_eval.report.results import Results, records_frame
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Executor, Serial
@@ -34,6 +33,7 @@ from holobench_eval.study.running.progress import Lines
 from tests.faults import devices
 from tests.faults.counts import note, taken
 from tests.support import plugins
+from tests.support.reports import write_texts
 
 LONGEST = 300.0  # seconds that a life may take before it counts as hung
 WORKERS = 2
@@ -123,8 +123,8 @@ def live(
         planned, watch = plan(study), Lines(lambda _: None)
         chosen, artifacts = executor(where), Path("artifacts")
         outcome = running.run(study, planned, Path("out"), chosen, watch, 1, artifacts, retry_failed=peace)
-        layout = layout_of(study)
-        write_files(Results(records_frame(outcome.records, layout), layout), Path("out"))
+        facts = facts_of(study)
+        write_texts(Results(records_frame(outcome.records, facts), facts), Path("out"))
     except (UserError, OSError) as error:  # which the command says in one line
         print(error, flush=True)
         os._exit(REFUSED)

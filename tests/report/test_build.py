@@ -17,7 +17,7 @@ from tests.support.reports import files, whole
 PROVENANCE = {"package": "0.1.0", "python": "3.11.2", "cpu": "a processor", "threads": 1}
 PROVENANCE |= {"packages": {"torch": "2.13.0"}}
 TARGETS = synthetic.TARGETS[1:4]
-LAYOUT = synthetic.layout(targets=TARGETS)
+FACTS = synthetic.facts(targets=TARGETS)
 DESCRIPTION = Description(
     displays=(Display("leto-aged", "Version 1. An aged panel.", ("crosstalk: width = 0.45",)),),
     config_file="configs/table3.yaml",
@@ -26,10 +26,10 @@ DESCRIPTION = Description(
 
 
 def minimal(records, **changes):
-    """The records of one display and three methods, and the layout for them: little to draw."""
+    """The records of one display and three methods, and the facts for them: little to draw."""
     kept = [r for r in records if r["cell"]["condition"] != "ideal" and r["label"] not in ("SGD", "HIL", "Oracle")]
     pairs = tuple((label, "leto-aged") for label in ("Double phase", "GS", "Wirtinger"))
-    return kept, synthetic.layout(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
+    return kept, synthetic.facts(**({"targets": TARGETS, "pairs": pairs, "reported": {}} | changes))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def records(tmp_path_factory):
 @pytest.fixture(scope="module")
 def report(records):
     folder, found = records
-    return whole(write_report(LAYOUT, found, folder, PROVENANCE, DESCRIPTION)[0])
+    return whole(write_report(FACTS, found, folder, PROVENANCE, DESCRIPTION)[0])
 
 
 def test_a_report_is_written_with_tables_and_every_figure(records, report):
@@ -62,14 +62,14 @@ def test_a_report_is_written_with_tables_and_every_figure(records, report):
 
 def test_two_equal_runs_give_equal_bytes_whatever_the_order_of_the_records(records, tmp_path):
     folder, found = records
-    kept, layout = minimal(found)
+    kept, facts = minimal(found)
     written = []
     for number, order in enumerate((kept, random.Random(1).sample(kept, len(kept)))):
         output = tmp_path / str(number)
         output.mkdir()
         (output / "records").symlink_to(folder / "records")
         of_the_run = {"started": str(number), "revision": f"{number}bc", "command": f"holoeval run {number}.yaml"}
-        write_report(layout, order, output, PROVENANCE | of_the_run, DESCRIPTION)
+        write_report(facts, order, output, PROVENANCE | of_the_run, DESCRIPTION)
         (output / "records").unlink()
         written.append(files(output))
     assert written[0].keys() == written[1].keys()
@@ -94,21 +94,21 @@ def test_a_reader_finds_what_was_measured_what_failed_and_how_to_do_it_again(rep
 
 
 def test_figures_of_an_earlier_run_do_not_stay(records, tmp_path):
-    kept, layout = minimal(records[1])
+    kept, facts = minimal(records[1])
     names = ("comparison-old-9.jpg", "stages-old.png", "stages-leto-aged.png")
     *stale, sheet = (tmp_path / "figures" / name for name in names)
     for file in (*stale, sheet):
         synthetic.save_picture(file, np.full((8, 8, 3), 0.5))
-    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
+    text = whole(write_report(facts, kept, tmp_path, {}, Description())[0])
     assert not any(file.exists() for file in stale)
     assert sheet.exists()
     assert "(figures/stages-leto-aged.png)" in text
 
 
 def test_missing_thumbnails_stop_nothing_and_two_targets_are_reported_without_tests(records, tmp_path):
-    kept, layout = minimal(records[1], targets=TARGETS[:1] + TARGETS[2:])
+    kept, facts = minimal(records[1], targets=TARGETS[:1] + TARGETS[2:])
     kept = [record for record in kept if record["cell"]["target"] != TARGETS[1]]
-    text = whole(write_report(layout, kept, tmp_path, {}, Description())[0])
+    text = whole(write_report(facts, kept, tmp_path, {}, Description())[0])
     assert "answer-pictures" not in text
     assert "No description of the displays was recorded." in text
     assert "The environment was not recorded." in text
@@ -119,10 +119,10 @@ def test_missing_thumbnails_stop_nothing_and_two_targets_are_reported_without_te
 def test_hostile_names_stay_text(records, tmp_path):
     evil = "<img src=x onerror=alert(1)> | **b** [l](javascript:1)"
     pairs = tuple((label, "leto-aged") for label in ("Double phase", "GS", evil))
-    kept, layout = minimal(records[1], title=evil, baseline=evil, pairs=pairs)
+    kept, facts = minimal(records[1], title=evil, baseline=evil, pairs=pairs)
     renamed = [record | {"label": evil} if record["label"] == "Wirtinger" else record for record in kept]
     description = Description(config_text="```\n<script>\n```", config_file="x.yaml")
-    text = whole(write_report(layout, renamed, tmp_path, {}, description)[0])
+    text = whole(write_report(facts, renamed, tmp_path, {}, description)[0])
     body = text.replace("```\n<script>\n```", "")
     assert "<img" not in body
     assert not re.search(r"(?<!\\)\]\(javascript", body)
@@ -136,18 +136,18 @@ def test_hostile_names_stay_text(records, tmp_path):
 
 
 def test_a_study_in_which_everything_failed_still_has_a_report(records, tmp_path):
-    kept, layout = minimal(records[1])
+    kept, facts = minimal(records[1])
     failed = [record | {"state": "failed", "reason": "no light", "scores": {}} for record in kept]
-    text = whole(write_report(layout, failed, tmp_path, {}, Description())[0])
+    text = whole(write_report(facts, failed, tmp_path, {}, Description())[0])
     assert "9 cells, 9 without a score." in text
     assert text.count("no light") == len(kept)
 
 
 def printed(folder, medium):
     few = ("wirtinger", "hil", "parametric_model (16 captures)", "online_camera (25 captures)")
-    layout = budget.layout(pairs=tuple((label, "leto-aged") for label in few))
+    facts = budget.facts(pairs=tuple((label, "leto-aged") for label in few))
     records = [r for r in budget.study() if r["cell"]["condition"] == "leto-aged" and r["label"] in few]
-    report = Report(Results(records_frame(records, layout), layout), [], folder / "none", {}, Description())
+    report = Report(Results(records_frame(records, facts), facts), [], folder / "none", {}, Description())
     return list(print_figures(report, folder / medium, medium))
 
 

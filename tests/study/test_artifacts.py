@@ -17,7 +17,7 @@ from rich.console import Console
 from holobench_eval.commands.plan import training_table, trainings
 from holobench_eval.core.errors import UserError
 from holobench_eval.core.io import write_atomically
-from holobench_eval.report import layout_of
+from holobench_eval.report import facts_of
 from holobench_eval.study.artifacts import (
     FAILURE,
     LOG,
@@ -294,13 +294,13 @@ def test_a_study_that_trains_nothing_gets_no_folder(study, artifacts, tmp_path):
     keep_training_records(plan(plain), artifacts, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert trainings(plan(plain), artifacts) == []
-    assert layout_of(plain).training is None
+    assert facts_of(plain).training is None
 
 
-def test_a_layout_knows_who_is_trained_and_on_how_many_images(study):
-    layout = layout_of(study)
-    told = layout.training
-    assert (layout.trained, told.images, told.held_out, told.captures) == ({"A b", "a-b"}, 3, 1, 9)
+def test_facts_know_who_is_trained_and_on_how_many_images(study):
+    facts = facts_of(study)
+    told = facts.training
+    assert (facts.labels("trained"), told.images, told.held_out, told.captures) == ({"A b", "a-b"}, 3, 1, 9)
 
 
 def test_a_preview_says_what_is_trained_unfinished_failed_and_missing(study, artifacts):

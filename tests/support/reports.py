@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+from holobench_eval.report import Results
+from holobench_eval.report.board import texts
+
 
 def whole(report: Path) -> str:
     """The text of both files. report: the path of report.md."""
@@ -11,3 +14,9 @@ def whole(report: Path) -> str:
 def files(folder: Path) -> dict[str, bytes]:
     """What is in the files below a folder, by path."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def write_texts(results: Results, folder: Path) -> None:
+    """Write the files of data of a report."""
+    for name, text in texts(results).items():
+        (folder / name).write_text(text)

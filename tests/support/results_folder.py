@@ -8,9 +8,9 @@ from typing import Any
 from holobench_eval.core.hashing import digest
 from holobench_eval.display import load_profile
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.files import write_files
 from holobench_eval.study.versions import HARNESS
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import write_texts
 
 TARGETS = synthetic.TARGETS[:4]
 SCORES = ("psnr_linear", "ssim_linear", "ms_ssim_linear", "efficiency")
@@ -37,9 +37,9 @@ def write_results(
     shown = tuple(pair for pair in pairs if pair[1] != "reference")
     panels = {record["cell"]["profile"]: (256, 256) for record in records}
     camera = frozenset(r["label"] for r in records if r["scores"].get("captures", r.get("captures", 0)))
-    layout = synthetic.layout(targets=TARGETS, pairs=shown, panels=panels, study=folder.name, camera=camera)
-    results = Results(records_frame([_short(record) for record in records], layout), layout)
-    write_files(results, folder)
+    facts = synthetic.facts(targets=TARGETS, pairs=shown, panels=panels, study=folder.name, camera=camera)
+    results = Results(records_frame([_short(record) for record in records], facts), facts)
+    write_texts(results, folder)
     (folder / "provenance.json").write_text(json.dumps(provenance(**(known or {}))))
     (folder / "report.md").write_text(REPORT)
     return folder

@@ -191,7 +191,8 @@ def _form(report: Report) -> Iterator[str]:
 
 
 def _tuned(report: Report) -> Iterator[str]:
-    same = grouped((text, label) for label, text in report.results.facts.methods["tuned"].dropna().items())
+    tuned = report.results.facts.methods["tuned"].dropna()
+    same = grouped((text, str(label)) for label, text in tuned.items())
     if parts := [f"of {words(labels)}, {text}" for text, labels in same.items()]:
         others = "The others have the settings of their papers, of this package or of the config."
         yield f"Tuned: {'; '.join(parts)}. {others}"

@@ -12,11 +12,11 @@ from holobench_eval.report.stories import answer
 from holobench_eval.report.stories.comparison import lacking
 from holobench_eval.study.folders import FILES
 from holobench_eval.study.folders.pairing import UNKNOWN
-from tests.support.synthetic_study import cell, layout, record, study
+from tests.support.synthetic_study import cell, facts, record, study
 
 
 def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
-    records, given = study(tmp_path, size=24), layout(measure=FILES)
+    records, given = study(tmp_path, size=24), facts(measure=FILES)
     one = lacking(Results(records_frame(records, given), given))  # GS lacks coffee on a display
     assert one.startswith("Only the 11 methods that have every target are ranked: GS on leto-aged lacks 1 of 6 targets")
     first = records[0]["cell"]["target"]
@@ -31,7 +31,7 @@ def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
 def holed(*holes: tuple[str, str, str, str]) -> Results:
     """Methods a to c with scores of four targets, but for holes: state, method, target, reason."""
     targets = ("t0", "t1", "t2", "t3")
-    given = layout(pairs=tuple((m, "d") for m in "abc"), targets=targets, privileged=frozenset(), reported={})
+    given = facts(pairs=tuple((m, "d") for m in "abc"), targets=targets, privileged=frozenset(), reported={})
     given = replace(given, baseline=None, measure=FILES, values="linear")
     lost = {(method, target): {"state": state, "reason": reason} for state, method, target, reason in holes}
     records = [

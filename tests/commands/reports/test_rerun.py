@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.commands.reports.rerun import Planned, Verdict, rerun, sample
-from holobench_eval.report import layout_of, recompute_files
+from holobench_eval.report import facts_of, recompute_files
 from holobench_eval.report.results import csv_text, read_records, records_frame
 from holobench_eval.study import executors
 from holobench_eval.study.config import load_study
@@ -31,7 +31,7 @@ class Committed:
 
     def commit(self, outcome: Outcome) -> None:
         """Leave a report as it is committed: tables of a finished run, empty texts beside them, and no records."""
-        self.write(csv_text(records_frame(outcome.records, layout_of(load_study(self.config)))))
+        self.write(csv_text(records_frame(outcome.records, facts_of(load_study(self.config)))))
         for name in ("report.md", "details.md"):
             (self.report / name).touch()
         shutil.rmtree(self.report / "records")
@@ -55,7 +55,7 @@ class Committed:
 
     def write(self, records: str) -> None:
         """The tables that follow from a text of records.csv."""
-        for name, text in recompute_files(records, layout_of(load_study(self.config))).items():
+        for name, text in recompute_files(records, facts_of(load_study(self.config))).items():
             (self.report / name).write_text(text)
 
 

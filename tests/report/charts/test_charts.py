@@ -75,8 +75,8 @@ def test_a_hole_is_counted_in_the_name_of_its_row(drawn, tmp_path):
     records = budget.study()
     lost = next(i for i, record in enumerate(records) if record["label"] == "hil")
     records[lost] = records[lost] | {"state": "failed", "scores": {}}
-    layout = budget.layout()
-    paired.draw(Results(records_frame(records, layout), layout), "leto-aged", tmp_path / "x.png")
+    facts = budget.facts()
+    paired.draw(Results(records_frame(records, facts), facts), "leto-aged", tmp_path / "x.png")
     assert f"hil, {len(budget.TARGETS) - 1} of {len(budget.TARGETS)} targets" in names(drawn[0].axes[0])
 
 
@@ -99,7 +99,7 @@ def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(found, drawn, 
     displays = board(found).displays
     curves.draw_costs(tmp_path / "x.png", displays, found.names, look.looks(found.names), "PSNR [dB]")
     for axes, display in zip(drawn[0].axes, displays, strict=True):
-        rows = [row for row in display.rows if row.label not in found.oracles]
+        rows = [row for row in display.rows if row.label not in found.facts.oracles]
         assert {text.get_text() for text in axes.get_legend().get_texts()} == {row.label for row in rows}
         places = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1}
         assert {(row.photographs, row.score.mean) for row in rows} <= places

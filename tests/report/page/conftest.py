@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from holobench_eval.report import Layout, write_report
+from holobench_eval.report import Facts, write_report
 from holobench_eval.report.description import Description, Display
 from tests.support import synthetic_study as synthetic
 
@@ -20,10 +20,10 @@ TARGETS = synthetic.TARGETS[:4]
 
 @dataclass(frozen=True)
 class Written:
-    """A report's folder, its layout, and the text of its page."""
+    """A report's folder, its facts, and the text of its page."""
 
     folder: Path
-    layout: Layout
+    facts: Facts
     text: str
 
     @property
@@ -43,8 +43,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     records = [
         record | {"label": renamed(record["label"])} for record in synthetic.study(folder, size=48, targets=TARGETS)
     ]
-    pairs = tuple((renamed(label), condition) for label, condition in synthetic.layout().pairs)
-    layout = synthetic.layout(title=TITLE, targets=TARGETS, pairs=pairs)
+    pairs = tuple((renamed(label), condition) for label, condition in synthetic.facts().pairs)
+    facts = synthetic.facts(title=TITLE, targets=TARGETS, pairs=pairs)
     description = Description((Display("leto-aged", f"Version {HOSTILE}", (HOSTILE,)),), "x.yaml", CONFIG)
-    write_report(layout, records, folder, {"cpu": HOSTILE}, description)
-    return Written(folder, layout, (folder / "report.html").read_text())
+    write_report(facts, records, folder, {"cpu": HOSTILE}, description)
+    return Written(folder, facts, (folder / "report.html").read_text())

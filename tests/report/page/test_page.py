@@ -111,9 +111,9 @@ def test_numbers_are_those_of_table_records_and_board(written: Written) -> None:
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
-    folder, layout = tmp_path_factory.mktemp("study"), synthetic.layout()
+    folder, facts = tmp_path_factory.mktemp("study"), synthetic.facts()
     records = synthetic.study(folder, size=32)
-    return Report(Results(records_frame(records, layout), layout), records, folder, {}, Description())
+    return Report(Results(records_frame(records, facts), facts), records, folder, {}, Description())
 
 
 def held(report: Report, room: int) -> dict[str, set[tuple[str, str]]]:

@@ -51,7 +51,7 @@ def test_each_display_is_held_against_its_own_floor() -> None:
 def test_a_method_that_lacks_a_target_has_no_letter_and_is_named_with_its_remedy() -> None:
     full = results_of({"old": 17.0, "new": 19.0, "other": 18.0}, question="Is new better?")
     kept = full.frame[(full.frame["label"] != "new") | (full.frame["target"] != EIGHT[0])].reset_index(drop=True)
-    holed = Results(kept, full.layout)
+    holed = Results(kept, full.facts)
     first, second = answer(holed)
     assert first == "other leads (18.05 dB), +1.00 dB [+1.00, +1.00] against old."
     assert "new lacks 1 of 8 targets (t0)" in second
@@ -61,7 +61,7 @@ def test_a_method_that_lacks_a_target_has_no_letter_and_is_named_with_its_remedy
 
 def test_two_targets_are_not_tested_and_have_no_letters() -> None:
     few = results_of(COMPARED, targets=EIGHT[:2])
-    few = Results(few.frame[few.frame["target"].isin(EIGHT[:2])].reset_index(drop=True), few.layout)
+    few = Results(few.frame[few.frame["target"].isin(EIGHT[:2])].reset_index(drop=True), few.facts)
     assert answer(few) == ["other leads (20.15 dB), +3.00 dB against old, untested."]
     assert "|  | other | 20.15 | +3.00 (no test) |" in table(few)
 

@@ -12,11 +12,11 @@ from holobench_eval.display import load_profile
 from holobench_eval.metrics import control, error_budget
 from holobench_eval.report import Results
 from holobench_eval.report.build import related
-from holobench_eval.report.files import write_files
 from holobench_eval.report.statistics import FEWEST_DISPLAYS, cause
 from holobench_eval.report.stories import answer, many_displays, story_of
 from holobench_eval.report.stories.many_displays import display_map, judged, margins, missed, parameters, shown_on
 from tests.support import synthetic_study as synthetic
+from tests.support.reports import write_texts
 from tests.support.synthetic_study import EIGHT, NOISE, results_of
 
 DISPLAYS = [f"leto-2020-{number:02d}" for number in range(1, 11)]
@@ -148,7 +148,7 @@ def test_without_a_budget_of_all_displays_there_is_no_map() -> None:
     assert display_map(crossing()) is None
     some = budget()
     kept = some.frame[some.frame["condition"] != DISPLAYS[2]]
-    assert display_map(crossing(budget=Results(kept, some.layout))) is None
+    assert display_map(crossing(budget=Results(kept, some.facts))) is None
 
 
 def test_a_score_of_models_is_judged_by_the_pairs_of_methods_that_it_orders() -> None:
@@ -169,8 +169,8 @@ def test_the_answer_names_what_to_measure_where_it_pays() -> None:
 def test_the_report_reads_the_parts_that_predict_in_its_folder(tmp_path: Path) -> None:
     other = budget()
     (tmp_path / "budget").mkdir()
-    write_files(other, tmp_path / "budget")
-    layout = replace(study().layout, related={"budget": other.layout, "not run": other.layout})
-    found = related(layout, tmp_path)
+    write_texts(other, tmp_path / "budget")
+    facts = replace(study().facts, related={"budget": other.facts, "not run": other.facts})
+    found = related(facts, tmp_path)
     assert list(found) == ["budget"]
     np.testing.assert_allclose(found["budget"].values("terms", DISPLAYS[3]), other.values("terms", DISPLAYS[3]))

@@ -30,10 +30,10 @@ EVIL = "Is HIL <script>alert(1)</script> | better | =cmd?\n\n# No heading"
 def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("front")
     records = synthetic.study(folder, targets=TARGETS)
-    layout = synthetic.layout(
+    facts = synthetic.facts(
         targets=TARGETS, question=EVIL, would_change="Another sign.", tuned={"HIL": "the rates were chosen elsewhere"}
     )
-    return write_report(layout, records, folder, {}, DESCRIPTION)[0].read_text()
+    return write_report(facts, records, folder, {}, DESCRIPTION)[0].read_text()
 
 
 def test_a_report_is_question_answer_board_plot_pictures_and_limits(page: str) -> None:

@@ -10,12 +10,13 @@ from scipy import stats
 
 from holobench_eval.display import load_profile
 from holobench_eval.display.simulated.changes import draws
-from holobench_eval.report import Layout, Results, layout_of, records_frame
+from holobench_eval.report import Results, facts_of, records_frame
 from holobench_eval.report.facts import Swept
 from holobench_eval.report.stories import answer
 from holobench_eval.report.stories.ranks import Ranks, figures, flips, left_out, rankings
 from holobench_eval.report.story import Report
 from holobench_eval.study.config import load_study
+from tests.support import made_facts
 from tests.support import synthetic_study as synthetic
 
 Quality = Callable[[Mapping[str, float]], float]
@@ -29,7 +30,7 @@ MIDDLE = 0.35
 
 
 def study(methods: Mapping[str, Quality], count: int = COUNT, **changes):
-    """Records and layout; methods: mean quality [dB] from a draw's parameters."""
+    """Records and facts; methods: mean quality [dB] from a draw's parameters."""
     drawn = tuple(draws.values(PROFILE, index) for index in range(1, count + 1))
     conditions = {DISPLAY: NOMINAL} | {f"{DISPLAY}, draw {i}": values for i, values in enumerate(drawn, start=1)}
     records = [
@@ -50,17 +51,17 @@ def study(methods: Mapping[str, Quality], count: int = COUNT, **changes):
         "baseline": next(iter(methods)),
         "sweeps": (Swept("draw", DISPLAY, points, drawn),),
     }
-    return records, Layout(**(given | changes))
+    return records, made_facts.facts(**(given | changes))
 
 
 def results_of(methods: Mapping[str, Quality], lost=(), **changes) -> Results:
     """The numbers of a study; lost: (label, draw, target) without a score, None for any."""
-    records, layout = study(methods, **changes)
+    records, facts = study(methods, **changes)
     for record in records:
         place = (record["label"], record["cell"]["condition"].rpartition("draw ")[2], record["cell"]["target"])
         if any(all(a in (None, b) for a, b in zip(each, place, strict=True)) for each in lost):
             record |= {"state": "failed", "scores": {}}
-    return Results(records_frame(records, layout), layout)
+    return Results(records_frame(records, facts), facts)
 
 
 def ranks_of(methods: Mapping[str, Quality], lost=(), **changes) -> Ranks:
@@ -93,10 +94,10 @@ def test_a_method_that_wins_above_the_middle_of_a_parameter_flips_there_and_the_
 
 
 def test_lower_is_better_turns_the_ranking_and_not_the_meaning_of_a_lead():
-    records, layout = study(FLIPPING, headline="mofd_srgb")
+    records, facts = study(FLIPPING, headline="mofd_srgb")
     for record in records:
         record["scores"] = {"mofd_srgb": record["scores"]["psnr_linear"]}
-    (ranks,) = rankings(Results(records_frame(records, layout), layout))
+    (ranks,) = rankings(Results(records_frame(records, facts), facts))
     pair = ranks.pairs[0]
     assert (pair.first, pair.second, pair.nominal) == ("steady", "robust", pytest.approx(1.0))
     assert ranks.cause(pair.draws).rho > 0  # more crosstalk raises the score of robust, which is worse
@@ -182,14 +183,14 @@ methods: [double_phase]
 
 def swept_of(folder, profile, more=""):
     (folder / "study.yaml").write_text(CONFIG.format(profile=profile, more=more))
-    return layout_of(load_study(folder / "study.yaml")).sweeps
+    return facts_of(load_study(folder / "study.yaml")).sweeps
 
 
 def values_of(*indices):
     return tuple(draws.values(load_profile("leto-2020"), index) for index in indices)
 
 
-def test_a_layout_knows_what_was_drawn_whether_the_profile_has_a_name_or_a_path(tmp_path):
+def test_facts_know_what_was_drawn_whether_the_profile_has_a_name_or_a_path(tmp_path):
     drawn, other = swept_of(tmp_path, "leto-2020")
     assert (drawn.drawn, other.drawn) == (values_of(1, 2), ())
     path = files("holobench_eval.display.simulated") / "profiles" / "leto-2020.yaml"

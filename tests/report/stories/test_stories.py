@@ -64,8 +64,8 @@ def test_a_file_adds_a_story_at_its_place_where_it_applies(tmp_path: Path, condi
         for label in ("GS", "Wirtinger")
         for target in synthetic.TARGETS
     ]
-    layout = synthetic.results(records).layout
-    text = whole(write_report(layout, records, tmp_path / "report", {}, Description())[0])
+    facts = synthetic.results(records).facts
+    text = whole(write_report(facts, records, tmp_path / "report", {}, Description())[0])
     applies = condition == "ideal"
     headings = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
     assert headings[:2] == ["Answer", r"Brightness \| of captures" if applies else "Limits"]
@@ -110,5 +110,5 @@ def test_a_committed_report_is_written_again_byte_for_byte(kind: str, tmp_path: 
 def test_a_study_without_a_score_has_no_answer(story, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stories, "story_of", lambda results: story)
     empty = synthetic.results_of({"old": np.nan, "new": np.nan})
-    lost = Results(empty.frame.assign(state="failed"), empty.layout)
+    lost = Results(empty.frame.assign(state="failed"), empty.facts)
     assert stories.answer(lost) == ["No cell of the study has a score, so there is no answer."]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.report import Results, records_frame
-from holobench_eval.report.facts import Layout, Swept
+from holobench_eval.report.facts import Facts, Swept
 from holobench_eval.report.stories import answer
 from holobench_eval.report.stories.sweeps import recovered, small_range, sweeps
 from holobench_eval.study.definition import Claim
@@ -32,26 +32,22 @@ def psnr(label: str, target: str, kind: str = "", value: float | str = 0.0) -> f
     return base + 4.0 - lost - (8.0 if kind == "eye" else 1.0 if kind == "known_eye" else 0.0)
 
 
-def layout() -> Layout:
+def facts(**changes: Any) -> Facts:
     kinds = {"drift": DAYS, "camera_shift_x": SHIFTS, "eye": ("-2",), "known_eye": ("-2",)}
     swept = tuple(
         Swept(kind, "leto-aged", tuple((value, title(kind, value)) for value in values))
         for kind, values in kinds.items()
     )
     conditions = ["leto-aged", *(name for one in swept for _, name in one.points)]
-    return synthetic.layout(
-        pairs=tuple((label, condition) for label in NAMES for condition in conditions),
-        targets=TARGETS,
-        privileged=frozenset(),
-        reported={},
-        sweeps=swept,
-    )
+    pairs = tuple((label, condition) for label in NAMES for condition in conditions)
+    given = {"pairs": pairs, "targets": TARGETS, "privileged": frozenset(), "reported": {}, "sweeps": swept}
+    return synthetic.facts(**(given | changes))
 
 
 def records() -> list[synthetic.Record]:
     found = []
     points = [("", 0.0, "leto-aged")]
-    points += [(one.kind, value, name) for one in layout().sweeps for value, name in one.points]
+    points += [(one.kind, value, name) for one in facts().sweeps for value, name in one.points]
     for label, name in NAMES.items():
         for target in TARGETS:
             for kind, value, condition in points:
@@ -62,7 +58,7 @@ def records() -> list[synthetic.Record]:
 
 
 def study(**changes: Any) -> Results:
-    made = replace(layout(), **changes)
+    made = facts(**changes)
     return Results(records_frame(records(), made), made)
 
 
@@ -91,7 +87,7 @@ def test_what_a_remedy_gets_back_is_told_as_a_share_of_what_was_lost() -> None:
     assert "gives back nothing, as no eye loses more than 1 dB." in answer(study())[0]
 
 
-WITHOUT_EYES = tuple(swept for swept in layout().sweeps if "eye" not in swept.kind)
+WITHOUT_EYES = tuple(swept for swept in facts().sweeps if "eye" not in swept.kind)
 
 
 def test_the_answer_has_the_worst_loss_and_whether_a_lead_stays() -> None:
@@ -115,7 +111,7 @@ def test_a_study_whose_baseline_is_best_is_told_of_another_method_too() -> None:
     ],
 )
 def test_a_claim_is_judged_as_far_as_it_goes(claim: Claim, verdict: str) -> None:
-    changed = tuple(replace(swept, claim=claim) for swept in layout().sweeps if swept.kind == "drift")
+    changed = tuple(replace(swept, claim=claim) for swept in facts().sweeps if swept.kind == "drift")
     assert answer(study(sweeps=changed, question="Does HIL stay?"))[1].startswith(verdict)
 
 

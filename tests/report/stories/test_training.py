@@ -9,7 +9,7 @@ import pytest
 
 from holobench_eval.core.hashing import digest
 from holobench_eval.display.estimates import estimate, joined
-from holobench_eval.report import Description, Results, records_frame, table_from_records, write_report
+from holobench_eval.report import Description, Results, records_frame, write_report
 from holobench_eval.report.charts.curves import MOST, draw_trainings
 from holobench_eval.report.facts import TrainingSet
 from holobench_eval.report.markdown import blocks
@@ -32,9 +32,9 @@ LOG = f"""{COLUMNS}
 """
 
 
-def layout(**changes):
+def facts(**changes):
     given = {"targets": TARGETS, "pairs": PAIRS, "reported": {}, "baseline": "GS", "privileged": frozenset()}
-    return synthetic.layout(**(given | {"trained": frozenset({"HIL", "U-Net"}), "training": TRAINING} | changes))
+    return synthetic.facts(**(given | {"trained": frozenset({"HIL", "U-Net"}), "training": TRAINING} | changes))
 
 
 def description(method):
@@ -72,11 +72,11 @@ def found(tmp_path_factory):
 
 
 def written(found, tmp_path, **changes):
-    return whole(write_report(layout(**changes), found, tmp_path, {}, Description())[0])
+    return whole(write_report(facts(**changes), found, tmp_path, {}, Description())[0])
 
 
 def report_of(found, folder, **changes):
-    results = Results(records_frame(found, layout(**changes)), layout(**changes))
+    results = Results(records_frame(found, facts(**changes)), facts(**changes))
     return Report(results, found, folder, {}, Description())
 
 
@@ -89,14 +89,14 @@ def section_of(found, folder):
 def test_captures_for_training_are_told_apart_from_those_while_solving(found):
     last = max(index for index, record in enumerate(found) if record["label"] == "HIL")
     lost = trained(found[last] | {"state": "failed", "reason": "x", "scores": {}}, "hil")
-    frame = records_frame([*found[:last], lost, *found[last + 1 :]], layout())
+    frame = records_frame([*found[:last], lost, *found[last + 1 :]], facts())
     took = frame[frame["state"] == "done"].groupby("label")[["captures", "training_captures", "training_s"]]
     assert took.mean().loc["HIL"].tolist() == [50, 140, 3600.5]
     assert took.mean().loc["GS"].tolist() == [0, 0, 0]
     holes = frame[frame["state"] == "failed"]
     assert len(holes) == 2
     assert holes["training_captures"].isna().all()
-    table = table_from_records(frame, layout())
+    table = Results(frame, facts()).table
     assert table.set_index("label").loc["HIL", "learned_sha256"] == "hil" * 16
 
 
@@ -156,7 +156,7 @@ def test_a_learned_display_claims_no_camera(found, tmp_path):
         if record["label"] == "HIL"
     ]
     keep(tmp_path, "hil")
-    learned = {"pairs": (("HIL", name),), "learned_display": name, "trained": frozenset({"HIL"}), "baseline": None}
+    learned = {"pairs": (("HIL", name),), "network": name, "trained": frozenset({"HIL"}), "baseline": None}
     text = written(moved, tmp_path, **learned)
     for phrase in ("refused.", "Stages of", "simulated benches"):
         assert phrase not in text.replace("a study in which one is a target is refused.", ""), phrase

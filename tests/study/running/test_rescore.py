@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from holobench_eval.display import CalibratedBench
-from holobench_eval.report import layout_of, records_frame
+from holobench_eval.report import facts_of, records_frame
 from holobench_eval.report.results import difference
 from holobench_eval.study import cost
 from holobench_eval.study.config import load_study
@@ -137,7 +137,7 @@ def test_a_new_metric_has_the_digits_of_a_fresh_run(study, fresh, done, measure)
     config = study(measure)
     grid, store = planned(config), Store(config.parent / "out")
     before = store.load(grid)
-    frame = records_frame(before, layout_of(load_study(config)))
+    frame = records_frame(before, facts_of(load_study(config)))
     assert difference(frame, grid) == ""
     again = compute(config, rescore=(NAME,))
     assert done == {}

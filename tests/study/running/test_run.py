@@ -9,7 +9,7 @@ from holobench_eval.commands.plan import preview
 from holobench_eval.core.errors import StorageError, UserError
 from holobench_eval.core.io import file_name
 from holobench_eval.core.pictures import open_picture
-from holobench_eval.report import Results, layout_of, records_frame
+from holobench_eval.report import Results, facts_of, records_frame
 from holobench_eval.study.config import load_study
 from holobench_eval.study.executors import Serial
 from holobench_eval.study.executors.clusters import Address
@@ -107,8 +107,8 @@ def test_targets_keep_their_pictures_when_displays_change_places(tmp_path):
     add_one_laser(tmp_path)
     for order in ("ideal, one.yaml", "one.yaml, ideal", "ideal, one.yaml"):
         config = write_inside(tmp_path, profiles=order, count=1)
-        layout = layout_of(load_study(config))
-        results = Results(records_frame(compute(config, tmp_path / "out").records, layout), layout)
+        facts = facts_of(load_study(config))
+        results = Results(records_frame(compute(config, tmp_path / "out").records, facts), facts)
         shapes = [results.shape(results.reference(name)) for name in ("ideal", "one")]
         paths = [Store(tmp_path / "out").target_thumbnail("gray 0", shape) for shape in shapes]
         assert [open_picture(path.read_bytes()).channels for path in paths] == [3, 1], order

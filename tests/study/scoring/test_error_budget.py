@@ -8,7 +8,7 @@ import pytest
 
 from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.wirtinger import Wirtinger
-from holobench_eval.report import layout_of
+from holobench_eval.report import facts_of
 from holobench_eval.report.results import Results, records_frame
 from holobench_eval.report.stories.error_budget import Budget, budgets
 from holobench_eval.study.config import load_study
@@ -41,8 +41,8 @@ def found(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(patterns, "Wirtinger", partial(Wirtinger, iterations=20))  # as all other holograms here
         records = computed(config)
-    layout = layout_of(load_study(config))
-    return {item.condition: item for item in budgets(Results(records_frame(records, layout), layout))}, records
+    facts = facts_of(load_study(config))
+    return {item.condition: item for item in budgets(Results(records_frame(records, facts), facts))}, records
 
 
 def interferes(record: dict[str, Any], target: str = "") -> bool:

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from holobench_eval.report import columns, layout_of, records_frame
+from holobench_eval.report import facts_of, records_frame
 from holobench_eval.study.config import load_study
 from tests.study.studies import compute
+from tests.support import synthetic_study as synthetic
 
 METHODS = """
 import torch
@@ -51,7 +52,7 @@ def test_frames_are_counted_kept_and_shown_together(tmp_path):
     assert [record["frames"] for record in (one, four)] == [1, 4]
     assert "m2: phase has 9 frames, the display shows 8 at most in an exposure" in nine["reason"]
     assert "m3: phase is (2, 3, 128, 127), the display shows (C, 128, 128)" in wrong["reason"]
-    frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    frame = records_frame(records, facts_of(load_study(tmp_path / "study.yaml")))
     assert frame["frames"].tolist()[:2] == [1, 4]
     assert frame["panel_time"].tolist()[:2] == [1, 4]
     saved = tmp_path / "out" / "phases"
@@ -64,16 +65,19 @@ def test_frames_are_counted_kept_and_shown_together(tmp_path):
 def test_a_study_of_single_frames_has_no_column_of_them(tmp_path):
     (record,) = records = records_of(tmp_path, "ideal", "")
     assert record["state"] == "done"
-    frame = records_frame(records, layout_of(load_study(tmp_path / "study.yaml")))
+    frame = records_frame(records, facts_of(load_study(tmp_path / "study.yaml")))
     assert not {"frames", "panel_time"} & set(frame)
 
 
 def test_panel_time_counts_the_frames_of_every_capture():
-    column = next(each for each in columns.FIGURES if each.name == "panel_time")
-    assert column.unit == "frames"
-    records = [{"frames": 8, "captures": 0}, {"frames": 8, "captures": 50}, {"captures": 50}, {"frames": 8}]
-    records.append({"frames": 4, "captures": 5, "shown": 5})
-    assert [column.source(record, None) for record in records] == [8, 408, 51, None, 9]
+    counts = [{"frames": 8, "captures": 0}, {"frames": 8, "captures": 50}, {"captures": 50}]
+    counts += [{"frames": 8, "captures": None}, {"frames": 4, "captures": 5, "shown": 5}]
+    records = [
+        synthetic.record("m", synthetic.cell("m", f"t{place}", "ideal"), {"psnr_linear": 1.0}, **each)
+        for place, each in enumerate(counts)
+    ]
+    results = synthetic.results(records, baseline=None)
+    assert results.frame["panel_time"].fillna(-1).tolist() == [8, 408, 51, -1, 9]
 
 
 def test_a_method_may_photograph_one_frame_and_give_several(tmp_path):
