@@ -113,10 +113,9 @@ def print_answer(console: Console, results: Results) -> None:
     The tables alone do not give it: intervals of means overlap where the paired difference is clear, and a method that
     is worse than a constant image has a rank, too.
     """
-    from ..report.phrases import too_few
     from ..report.stories import answer
 
-    for sentence in (*answer(results), *filter(None, [too_few(results)])):
+    for sentence in answer(results):
         console.print(f"- {sentence}", markup=False)
 
 

@@ -20,7 +20,7 @@ from ..study.plan import is_reference
 from .columns import dictionary
 from .facts import CALIBRATED, GIVEN, ONLINE, OPEN_LOOP, ORACLE
 from .latex import latex_tables
-from .phrases import marks, verdict
+from .phrases import MARGINS, marks, verdict
 from .results import Results, csv_text, to_json
 from .scores import Score
 from .statistics import Estimate, PairedTest, tiers
@@ -36,9 +36,6 @@ GROUPS = {
 }
 SEVERAL = ", several frames in an exposure"
 VERSION = 2
-# By the unit of a headline: how far behind the best of its letter a row begins the next one at least, since another
-# seed moves a score by 0.03 dB, and how far behind it a row with the same letter is at most.
-MARGINS = {"dB": (0.1, 1.0)}
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import MappingProxyType
 
@@ -20,8 +20,6 @@ from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
 from .text import plain, words
-
-PER_COLOUR = ("gamma", "gain", "width")  # of stages, where a value is a tuple
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def simulated(
     return Display(
         name=profile.name,
         heading=f"Version {profile.version}, sha256 {profile.digest[:16]}. {profile.description}",
-        lines=(f"panel: {profile.scaling_note(panel)}", _optics(profile.scaled(panel).panel), *_stages(profile)),
+        lines=(f"panel: {profile.scaling_note(panel)}", _optics(profile.scaled(panel).panel), _stages(profile)),
         basis=f"{basis(profile)}{_gray(profile.panel)}",
         modelled={label: (len(form.intersection(effects)), len(effects)) for label, form in forms.items()},
     )
@@ -118,7 +116,7 @@ def simulated(
 
 def basis(profile: Profile) -> str:
     """Where the parameters of a simulated display come from."""
-    measured = "simulated, with parameters that are assumed or from data sheets and measured on no panel"
+    measured = "simulated, with parameters that are assumed or from data sheets"
     if profile.network.method:
         return ", ".join(filter(None, (f"predicted by a trained {profile.network.method}", profile.twin.words)))
     if profile.twin.of:
@@ -126,19 +124,13 @@ def basis(profile: Profile) -> str:
     if profile.held:
         return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:
-        return f"{measured}; drawn from ranges, and kept since its captures come near published figures"
+        return "simulated, chosen for reproducing the published PSNR"
     try:
         calibration = load_calibration(profile)
     except UserError:
         return measured
-    figures = [f"{name} {psnr:g} dB" for name, psnr in calibration.figures.items()]
-    if calibration.prediction:
-        figures.append(f"predictions by a U-Net {calibration.prediction.psnr:g} dB")
     free = words([name.replace(".", " ").replace("_", " ") for name in calibration.free])
-    return (
-        f"{measured}; {free} were fitted to published PSNR ({', '.join(figures)}), on {calibration.targets.dataset}, "
-        "so that agreement with these figures is no evidence"
-    )
+    return f"simulated, with {free} fitted to published PSNR, so that agreement with it is no evidence"
 
 
 def _gray(panel: Panel | DisplaySpec) -> str:
@@ -154,16 +146,12 @@ def _optics(panel: Panel | DisplaySpec) -> str:
     return f"optics: pitch {panel.pitch * 1e6:.4g} um, wavelengths {wavelengths} nm, {panel.bits} bit, {iris}{frames}"
 
 
-def _stages(profile: Profile) -> list[str]:
-    """A line for every stage of the bench whose parameters are not the neutral ones."""
-    lines = []
+def _stages(profile: Profile) -> str:
+    """The stages of the bench whose parameters are not the neutral ones; the profile has the values."""
+    names = []
     for item in fields(profile):
         stage = getattr(profile, item.name)
         neutral = item.default_factory() if item.default_factory is not MISSING else item.default
         if is_dataclass(stage) and not isinstance(stage, type | Panel) and stage != neutral:
-            values = {key: value for key, value in asdict(stage).items() if key != "maps"}
-            for name in PER_COLOUR:
-                if isinstance(values.get(name), tuple):
-                    values[name] = values[name][: len(profile.panel.wavelengths)]
-            lines.append(f"{item.name.replace('_', ' ')}: {plain(values)}")
-    return lines
+            names.append(item.name.replace("_", " "))
+    return f"stages with effects: {', '.join(names) or 'none'}"

@@ -6,6 +6,7 @@ has its interval, sample and p value, and says whether it is shown.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,16 @@ from ..core import plugins
 from ..core.errors import listed, one_line
 from ..study.folders.files import named
 from ..study.versions import EDITED, dataset_version
-from .facts import ORACLE
+from .facts import ORACLE, PLACES
 from .results import DONE, Results
 from .scores import Score
 from .statistics import FEWEST, SIGNIFICANCE, Estimate, PairedTest
 from .text import words
 
+UNSHOWN, ALIKE = "not shown to differ", "alike"
+# By the unit of a headline: the least difference that matters, which begins the next letter of a board, since another
+# seed moves a score by 0.03 dB, and how far behind the best of its letter a row is at most.
+MARGINS = {"dB": (0.1, 1.0)}
 INSTALLED = frozenset({"site-packages", "dist-packages"})  # folders of packages that pip has installed
 
 
@@ -30,12 +35,18 @@ def difference(score: Score, estimate: Estimate) -> str:
     return score.estimate(estimate, signed=True, unit=True)
 
 
+def effect(score: Score, test: PairedTest) -> str:
+    """``verdict``, but ``alike`` where a difference is shown and smaller than what matters."""
+    told, margin = verdict(score, test), MARGINS.get(score.unit, (0.0, np.inf))[0]
+    return ALIKE if told in ("better", "worse") and abs(test.estimate.mean) < margin else told
+
+
 def verdict(score: Score, test: PairedTest) -> str:
     """``better``, ``worse``, ``not shown to differ`` or, without a test, ``not tested``."""
     if np.isnan(test.p):
         return "not tested"
     if not test.is_shown:
-        return "not shown to differ"
+        return UNSHOWN
     return "better" if score.better(test.estimate.mean, 0.0) else "worse"
 
 
@@ -126,11 +137,11 @@ def too_few(results: Results) -> str:
         ),
         default=0,
     )
-    clusters = len(set(results.clusters))
-    smallest = 2.0 ** (1 - clusters)
-    if rivals < 2 or clusters < FEWEST or smallest < SIGNIFICANCE:
+    clusters, enough = len(set(results.clusters)), 1 + math.ceil(-math.log2(SIGNIFICANCE))
+    if rivals < 2 or not FEWEST <= clusters < enough:
         return ""
-    return f"With {clusters} clusters no p can be below {smallest:.2g}: no difference can be shown."
+    groups = "scenes" if results.study.measure in PLACES else "targets that are independent"
+    return f"No difference can be shown: {clusters} {groups} are too few for a test, {enough} are needed."
 
 
 def remarks(results: Results) -> list[str]:

@@ -95,8 +95,8 @@ class Text:
     )
     caution: str = ""
     displays: str = (
-        "The displays are simulated benches. Listed are the nominal optics, which methods know, and the parameters of "
-        "each stage that differs from an ideal bench, which methods do not know."
+        "The displays are simulated benches. Listed are the nominal optics, which methods know, and the stages that "
+        "differ from an ideal bench, whose values, in the profile, methods do not know."
     )
     compared: str = "in linear light"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"

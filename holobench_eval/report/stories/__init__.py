@@ -16,6 +16,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
+from ..phrases import too_few
 from ..results import Results
 from ..story import Part, mentioned, subjects
 from ..text import words
@@ -38,7 +39,7 @@ def answer(results: Results) -> list[str]:
     """The verdicts of the study's own story; a sentence in their place where no score allows one."""
     if not results.conditions or results.done.empty:
         return ["No cell of the study has a score, so there is no answer."]
-    verdicts = [verdict for verdict in story_of(results).verdicts(results) if verdict]
+    verdicts = [verdict for verdict in (too_few(results), *story_of(results).verdicts(results)) if verdict]
     named = mentioned(results.labels, " ".join(verdicts))
     if silent := [label for label in subjects(results) if label not in named]:
         verdicts[:0] = [f"Nothing is said of {words(silent)}: a score is missing, of a target or of the baseline."]

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..phrases import verdict
+from ..phrases import effect
 from ..results import Results
 from ..text import grouped, words
 
 ORDER = 80
 QUESTION = "Which single change of the method matters?"
-LIMITS = (
-    "Training: each row was trained once, and the intervals do not hold what another training of the same row "
-    "would change; a row with another seed, where there is one, shows how much that is.",
-)
+LIMITS = ("Training: each row was trained once, and no interval holds what another training would change.",)
 FEWEST = 3  # variants of the baseline method that make a study an ablation
-NAMED = 3  # changes that the verdict lists with their differences
+NAMED = 2  # changes that the verdict lists with their differences
 
 
 def applies(results: Results) -> bool:
@@ -42,17 +39,16 @@ def verdicts(results: Results) -> Iterator[str]:
     for condition in results.conditions:
         tests = [test for label in variants if (test := results.tested(label, condition))]
         reseeded = [test for test in tests if variants[test.second] == {"seed"}]
-        changes = [test for test in tests if test not in reseeded]
-        if not changes:
-            continue
-        largest = sorted(changes, key=lambda test: -abs(test.estimate.mean))
-        groups, parts = grouped((verdict(score, test), test) for test in largest), list[str]()
-        for name, effect in (("worse", "lower"), ("better", "raise")):
-            same = groups.get(name, [])
-            listed = [f"{test.second} ({score.number(test.estimate.mean, signed=True)})" for test in same[:NAMED]]
-            more = f" and {len(same) - NAMED} more" if len(same) > NAMED else ""
-            parts.append(f"{len(same) or 'none'} {effect} it{f': {words(listed)}{more}' if same else ''}")
+        changes = sorted((test for test in tests if test not in reseeded), key=lambda test: -abs(test.estimate.mean))
+        groups, sentences, left = grouped((effect(score, test), test) for test in changes), list[str](), len(changes)
+        for told, word in (("worse", "Worse"), ("better", "Better")):
+            same = groups.get(told, [])
+            named = [f"{test.second}, {score.with_unit(test.estimate.mean, signed=True)}" for test in same[:NAMED]]
+            more = f"; {len(same) - NAMED} more" if len(same) > NAMED else ""
+            sentences += [f"{word}: {'; '.join(named)}{more}."] * bool(same)
+            left -= len(same)
+        rest = f"{left} of {len(changes)} changes are not shown to matter."
         moved = [score.with_unit(abs(test.estimate.mean)) for test in reseeded]
-        chance = f" Another seed moves it by {words(moved)}: what is smaller is chance." if moved else ""
-        begin = f"{condition}: " * (len(results.conditions) > 1)
-        yield f"{begin}Of {len(changes)} changes of {results.baseline}, {'; '.join(parts)}.{chance}"
+        chance = [f"Another seed: {words(moved)}."] * bool(moved)
+        if changes:
+            yield f"{f'{condition}: ' * (len(results.conditions) > 1)}{' '.join([*sentences, rest, *chance])}"

@@ -9,18 +9,16 @@ from ..board import board
 from ..charts.curves import draw_costs
 from ..charts.look import looks
 from ..facts import OFFLINE, ONLINE
-from ..phrases import value, verdict
+from ..phrases import effect, value
 from ..results import Results
-from ..story import Part, Report, is_many
+from ..story import Report, is_many
 from ..text import grouped, number, words
-from . import story_of
 
 ORDER = 90
 QUESTION = "How many captures does a method need, and what do more captures buy?"
 LIMITS = (
-    "Captures: those of a training are counted once and those of solving for every target, so with more targets "
-    "the methods that use the camera for each image cost more and the others do not. Differences between budgets "
-    "of a method are untested.",
+    "Captures: those of a training count once, those of solving for every target. Differences between budgets of a "
+    "method are untested.",
 )
 
 
@@ -56,32 +54,27 @@ def verdicts(results: Results) -> Iterator[str]:
         families = _families(results, condition)
         for name, rows in families.items():
             tests = [(captures, test) for captures, label in rows if (test := results.tested(label, condition))]
-            beats = [captures for captures, test in tests if verdict(results.headline, test) == "better"]
+            beats = [captures for captures, test in tests if effect(results.headline, test) == "better"]
             passed += [(captures, f"{name} {number(captures)}") for captures in beats[:1]]
             failed += [name] * bool(tests and not beats)
-        if not families:
-            continue
-        few, never = ", ".join(text for _, text in sorted(passed)), f"; never: {words(failed)}" if failed else ""
-        fewest = f"Fewest photographs, of those tried, that beat {baseline}: {few}{never}"
-        none = f"With no number of photographs, of those tried, {words(list(families))} is shown to beat {baseline}"
+        few = [text for _, text in sorted(passed)]
+        sentences = [f"Photographs that it takes to beat {baseline}: {', '.join(few)}."] * bool(few)
+        sentences += [f"With no number tried: {words(failed)}."] * bool(few and failed)
+        if failed and not few:
+            sentences = [f"No: with no number of photographs tried {words(failed)} is shown to beat {baseline}."]
         best = results.ranking(condition, categories=(*OFFLINE, ONLINE))[0]
-        cost = number(_captures(results, best, condition))
-        begin = f"{condition}: " * (len(results.conditions) > 1)
-        yield f"{begin}{fewest if passed else none}. Best: {best} with {cost}, {value(results, best, condition)}."
+        cost = f" with {number(_captures(results, best, condition))}" * (best != baseline)
+        if families:
+            begin = f"{condition}: " * (len(results.conditions) > 1)
+            yield f"{begin}{' '.join(sentences)} Best: {best}{cost}, {value(results, best, condition)}."
 
 
-def _drawn(report: Report, own: bool) -> bool:
-    """Whether quality is drawn against captures, on the first page where that is the study's ``own`` question."""
-    results = report.results
-    if not results.facts.spends or results.facts.predicts or is_many(results) or results.done.empty:
-        return False
-    spends = "total_captures" in results.table and bool((results.table["total_captures"] > 0).any())
-    return spends and own == (story_of(results).QUESTION == QUESTION)
-
-
-def _costs(report: Report) -> Iterator[tuple[Path, str]]:
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Quality against the photographs that it cost."""
     results, path = report.results, report.figures / "quality-captures.png"
+    spends = "total_captures" in results.table and bool((results.table["total_captures"] > 0).any())
+    if not (spends and results.facts.spends) or results.facts.predicts or is_many(results) or results.done.empty:
+        return
     axis = f"{results.headline.axis}{results.text.axis}"
     displays = [each for each in board(results).displays if any(row.photographs for row in each.rows)]
     draw_costs(path, displays, results.names, looks(results.names), axis)
@@ -90,9 +83,3 @@ def _costs(report: Report) -> Iterator[tuple[Path, str]]:
         f"{axis}, against all photographs of a row: those of its training once, and those of every target. Lines join "
         "the rows of a method. Bars: 95 % interval of the difference to the baseline.",
     )
-
-
-PARTS = (
-    Part(44, applies=lambda report: _drawn(report, own=True), figures=_costs),
-    Part(40, applies=lambda report: _drawn(report, own=False), figures=_costs, details=True),
-)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
 from ...core.errors import listed
 from ...study.folders.files import remedies
 from ..board import Board, Display, Row, board
+from ..charts import paired
 from ..facts import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
 from ..markdown import Markdown, blocks, code, heading, table_of
-from ..phrases import difference, verdict
+from ..phrases import ALIKE, UNSHOWN, difference, effect, too_few, verdict
 from ..results import Results
-from ..statistics import SIGNIFICANCE
+from ..statistics import SIGNIFICANCE, PairedTest
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
 from ..text import FILES, grouped, number, words
 
@@ -22,9 +25,16 @@ QUESTION = "Which method gives the better picture, and by how much?"
 NAMED = 3  # methods of one letter
 LISTED = 10  # methods, or targets of all of them
 LISTED_EACH = 3  # targets of a method
-OTHER = "{baseline}"  # the place of the baseline's name, which a verdict says once
 MOST_ROWS = 30  # of boards, one below the other
-UNSHOWN = "not shown to differ"
+ASKS = re.compile(r"^(Does|Do|Is|Are)\b.*\b(better|gains?|beats?)\b")
+CONTROL = "Control: the share of what a change of the hologram does to its capture that a model foresees (0 to 1)."
+EFFECTS = {  # in words, of a method and of several
+    "better": ("beats", "beat"),
+    UNSHOWN: ("is not shown to differ from", "are not shown to differ from"),
+    ALIKE: ("is as good as", "are as good as"),
+    "worse": ("loses to", "lose to"),
+    "not tested": ("is, untested, against", "are, untested, against"),
+}
 SIGNS = {"better": "", "worse": "", UNSHOWN: "°", "not tested": " (no test)"}
 
 
@@ -42,7 +52,62 @@ def verdicts(results: Results) -> Iterator[str]:
 
 
 def of_display(results: Results, display: Display, begin: str = "") -> str:
-    """Who leads without a camera at the scored picture, with one, and what becomes of the methods of the question."""
+    """What becomes of the methods of the question; who is best, without a camera, and with one at the picture."""
+    tests = [row.test for row in display.rows if row.test and row.label in subjects(results)]
+    sentences = [
+        *_at_speed(results, display),
+        *_yes(results, tests),
+        *compared(results, tests),
+        *_best(results, display),
+    ]
+    return f"{begin}{' '.join(sentences)}" * bool(sentences)
+
+
+def _at_speed(results: Results, display: Display) -> Iterator[str]:
+    """Of the networks of the question that take no photograph, which are better than every method as fast."""
+    blind = [row for row in display.rows if row.label in {*subjects(results)} & results.facts.labels("blind")]
+    better = [row.label for row in blind if not any(mark.startswith("dominated") for mark in row.marks)]
+    if blind and results.study.measure == "picture":
+        yield f"Better than every method as fast: {words(better) or 'none'}."
+
+
+def _yes(results: Results, tests: list[PairedTest]) -> Iterator[str]:
+    """Yes or no, where a question asks whether its methods are better and all of them have one answer."""
+    asked = ASKS.search(results.study.question) and not results.facts.labels("blind").intersection(subjects(results))
+    better = [effect(results.headline, test) == "better" for test in tests]
+    if asked and better and not too_few(results) and all(better) in (True, any(better)):
+        yield "Yes." if all(better) else "No."
+
+
+def compared(results: Results, tests: list[PairedTest]) -> Iterator[str]:
+    """A sentence for the methods with one effect against the baseline, those with published figures apart."""
+    score, known = results.headline, dict[str, str]()
+    for test in tests:
+        margin = published(results, test.second, test.condition)
+        known[test.second] = "" if margin is None else f"; published {score.with_unit(margin, signed=True)}"
+    groups = grouped(((effect(score, test), known[test.second]), test) for test in tests)
+    few = bool(too_few(results))
+    for told, beside in sorted(groups, key=lambda group: [*EFFECTS].index(group[0])):
+        same = sorted(groups[told, beside], key=lambda test: -score.sign * test.estimate.mean)
+        names, ends = (
+            words([test.second for test in same]),
+            [score.number(test.estimate.mean, signed=True) for test in same],
+        )
+        by = f"{' to '.join(dict.fromkeys((ends[0], ends[-1])))} {score.unit}".strip()
+        if len(same) == 1 and told in ("better", "worse"):
+            by = difference(score, same[0].estimate)
+        if few:  # no test can show anything, so that counts say what is there
+            each = zip(same, ends, strict=True)
+            counts = (
+                f"{by} {score.unit}, better on {t.better(score.sign)} of {t.estimate.n} targets" for t, by in each
+            )
+            yield f"{names} against {results.baseline}: {'; '.join(counts)}{beside}."
+        else:
+            yield f"{names} {EFFECTS[told][len(same) > 1]} {results.baseline}, {by}{beside}."
+
+
+def _best(results: Results, display: Display) -> Iterator[str]:
+    """Who leads among those that see no camera at the scored picture, and in the other groups."""
     complete = [
         rows for _, group in display.groups if (rows := [row for row in group if row.scored == len(results.targets)])
     ]
@@ -50,24 +115,28 @@ def of_display(results: Results, display: Display, begin: str = "") -> str:
     single = [rows for (category, several), rows in groups.items() if category not in (ONLINE, ORACLE) and not several]
     first = max(single, key=lambda rows: results.headline.sign * rows[0].score.mean, default=[])
     blind = [] if first is groups.get((OPEN_LOOP, False)) else groups.get((OPEN_LOOP, False), [])
-    named, parts = list[str](), list[str]()
-    for rows, where in (
-        (first, _among(results, first)),
-        (blind if first is groups.get((CALIBRATED, False)) else [], "without a camera "),
-        (groups.get((OPEN_LOOP, True), []), "with several frames "),
-        (groups.get((ONLINE, False), []), "with photographs of the picture itself "),
-    ):
+    places = (
+        (first, f"Best{_among(results, first)}"),
+        (blind if first is groups.get((CALIBRATED, False)) else [], "Without a camera"),
+        (groups.get((OPEN_LOOP, True), []), "With several frames"),
+        (groups.get((ONLINE, False), []), "With photographs of the picture itself"),
+    )
+    against = f" against {results.baseline}"
+    for rows, where in places:
         if rows:
-            tied = [row.label for row in rows if row.tier == "A"][:NAMED] or [rows[0].label]
-            named += tied
-            parts.append(f"{where}{_leads(results, rows[0], tied)}")
-    for row in display.rows:
-        if row.test and row.label in subjects(results) and row.label not in named:
-            margin = published(results, row.label, display.name)
-            known = "" if margin is None else f" (published {results.headline.with_unit(margin, signed=True)})"
-            parts.append(f"{row.label} {_against(results, row)}{known}")
-    text = f"{begin}{'; '.join(parts)}." if parts else ""
-    return text.replace(OTHER, f" against {results.baseline}", 1).replace(OTHER, "")
+            row, tied = rows[0], [row.label for row in rows if row.tier == "A"][:NAMED]
+            parts = [words(tied or [row.label])]
+            parts += ["not told apart"] * (len(tied) > 1) + [results.headline.with_unit(row.score.mean)] * (
+                rows is first
+            )
+            if row.test and results.baseline not in tied:
+                mean = results.headline.with_unit(row.test.estimate.mean, signed=True)
+                is_known = rows is first and verdict(results.headline, row.test) != UNSHOWN
+                parts.append(f"{difference(results.headline, row.test.estimate) if is_known else mean}{against}")
+                parts += [UNSHOWN] * (verdict(results.headline, row.test) == UNSHOWN)
+                against = ""
+            parts += [row.camera.replace(" ", " photographs ", 1)] if row.photographs else []
+            yield f"{where}: {', '.join(parts)}."
 
 
 def _among(results: Results, rivals: list[Row]) -> str:
@@ -76,25 +145,7 @@ def _among(results: Results, rivals: list[Row]) -> str:
     if test is None or not results.headline.better(0.0, test.estimate.mean):
         return ""
     knows = results.category(test.first) == ORACLE
-    return "without knowing the display " if knows else "without photographs of the picture itself "
-
-
-def _leads(results: Results, row: Row, tied: list[str]) -> str:
-    """``a and b lead, not told apart (20.05 dB), +3.00 dB [+2.80, +3.20], for 40 photographs``."""
-    apart = ", not told apart" * (len(tied) > 1)
-    gained = f", {_against(results, row)}" if row.test else ""
-    cost = f", for {row.camera.replace(' ', ' photographs ', 1)}" if row.photographs else ""
-    mean = results.headline.with_unit(row.score.mean)
-    return f"{words(tied)} lead{'s' * (len(tied) == 1)}{apart} ({mean}){gained}{cost}"
-
-
-def _against(results: Results, row: Row) -> str:
-    """``+1.30 dB [+0.43, +2.17]``, what it is the difference to, and whether that is shown."""
-    assert row.test is not None
-    told, mean = verdict(results.headline, row.test), row.test.estimate.mean
-    if told == UNSHOWN:  # an interval of one comparison could contradict the test of all
-        return f"{results.headline.with_unit(mean, signed=True)}{OTHER}, not shown to differ"
-    return f"{difference(results.headline, row.test.estimate)}{OTHER}{', untested' * (told == 'not tested')}"
+    return " without knowing the display" if knows else " without photographs of the picture itself"
 
 
 def published(results: Results, label: str, condition: str) -> float | None:
@@ -137,6 +188,7 @@ def legend(board: Board) -> str:
         texts.append(f"°: {UNSHOWN} (p ≥ {SIGNIFICANCE:g}, adjusted for {count} comparisons).")
     texts += ["*: no better than gray."] * any("no better than gray" in row.marks for row in rows)
     texts += [f"A gray picture scores {'; '.join(gray)}."] * bool(gray)
+    texts += [CONTROL] * bool(results.control)
     return " ".join([*texts, "Brackets: 95 % intervals."])
 
 
@@ -195,6 +247,16 @@ def _line(board: Board, display: Display, row: Row) -> dict[str, object]:
     if results.study.measure != FILES:
         costs |= {"processor seconds": number(row.seconds), "memory [MiB]": number(row.memory)}
     return line | costs
+
+
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
+    """Differences to the baseline on each display that has any; of many displays on the first."""
+    results = report.results
+    own = results.study.measure == "error_budget" or (is_many(results) and not results.facts.predicts)
+    drawn = [] if own else paired.displays(results)
+    for condition, stem in drawn[:1] if is_many(results) else drawn:
+        path = report.figures / f"quality-paired-{stem}.png"
+        yield path, paired.draw(results, condition, path)
 
 
 def lacking(results: Results) -> str:

@@ -24,17 +24,17 @@ import numpy as np
 from ...metrics import error_budget as scores
 from ..board import Board
 from ..charts.error_budget import draw_budgets
-from ..markdown import Markdown, table_of
+from ..markdown import Markdown, blocks, table_of
 from ..results import Results
 from ..statistics import Array, Estimate
-from ..story import Part, Report, is_many
-from ..text import bracketed, percent, words
+from ..story import Report, is_many
+from ..text import bracketed, percent
+from .comparison import CONTROL
 
 ORDER = 10
 QUESTION = "Where does the error of the captures come from, and who can remove it?"
 LIMITS = (
-    "Bounds: a part is what one prediction explains and none before it did, if it is known which prediction to "
-    "believe; a hologram gains less from it than its dB, and a larger model or more captures may explain more.",
+    "Bounds: a part is what a prediction explains and none before it does; a hologram gains less from it than its dB.",
     "Parts: image-domain terms are a tone curve, shading, blur and haze, fitted on training captures.",
 )
 
@@ -114,17 +114,21 @@ def verdicts(results: Results) -> Iterator[str]:
     known = budgets(results)
     if not known:
         yield "No display has the scores of all methods for all targets, so none has a budget."
-    elif is_many(results):
-        over = _over(known).items()
-        shares = [f"{label} {part.mean():.0f} % ({part.min():.0f} to {part.max():.0f})" for label, part in over]
-        yield f"Over {len(known)} displays, the squared error is explained by {words(shares)}."
-    else:
-        for budget in known:
-            shares = [f"{part.label} {100 * part.share.mean:z.0f} %" for part in budget.parts]
-            # of the last two links of the chain: of the image, and of the field
-            gains = [f"{part.gain.mean:+.1f} dB with {part.label}" for part in budget.explained[-2:] if part.gain]
-            begin = f"{budget.condition}: " * (len(known) > 1)
-            yield f"{begin}the error is explained by {', '.join(shares)}; at most {words(gains)}."
+    for found in [known] if is_many(results) and known else [[budget] for budget in known]:
+        shares = {
+            part.label: 100 * np.array([b.parts[i].share.mean for b in found]) for i, part in enumerate(found[0].parts)
+        }
+        *before, last, _, _ = shares
+        means = {label: f"{values.mean():z.0f} %" for label, values in shares.items()}
+        ends = f" ({shares[last].min():.0f} to {shares[last].max():.0f})" * (len(found) > 1)
+        image = sum(shares[label].mean() for label in before)
+        rest = [f"{label} {means[label]}" for label in [*shares][-2:]]
+        gains = [b.explained[-1].gain.mean for b in found if b.explained[-1].gain]
+        begin = f"{found[0].condition}: " if 1 < len(known) != len(found) else ""
+        yield (
+            f"{begin}Only {last} explains {means[last]}{ends} of the error, what is known of the image {image:.0f} %; "
+            f"without both, captures gain {max(gains):.1f} dB at most. By nothing: {' and '.join(rest)}."
+        )
 
 
 def _over(known: list[Budget]) -> dict[str, Array]:
@@ -162,10 +166,10 @@ def table(board: Board) -> Markdown | None:
             }
             control = {score.heading: "–" if model is None else score.in_row(model) for score in results.control}
             lines.append(line | control)
-    return table_of(lines)
+    return blocks([table_of(lines), CONTROL if results.control else None]) if lines else None
 
 
-def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Where the error of captures comes from."""
     if known := budgets(report.results):
         path = report.figures / "error-budget.png"
@@ -176,6 +180,3 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
             "what removing a part and all parts to its left would gain at most, with its 95 % interval over clusters; "
             "for temporal noise, what captures with no other error would gain.",
         )
-
-
-PARTS = (Part(5, figures=_figures),)

@@ -7,18 +7,16 @@ from collections.abc import Iterator, Mapping
 from ..board import Board
 from ..facts import PLACES
 from ..markdown import Markdown, heading, table_of
-from ..phrases import difference, marked, value, verdict
+from ..phrases import marked, value
 from ..results import Results
 from ..statistics import mean_interval
 from ..story import Blocks, Figures, Part, Report, subjects
 from ..text import number
+from .comparison import compared
 
 ORDER = 40
 QUESTION = "What does a hologram of all planes or views of a scene gain over that of one, and what does it cost?"
-LIMITS = (
-    "Scenes: the planes or views of a scene are not independent, so intervals and tests are over scenes, which are "
-    "few.",
-)
+LIMITS = ("Scenes: planes or views of a scene are not independent, so intervals and tests are over scenes.",)
 
 # By measure: what a hologram is made of that knows of all and that knows of one; the title of the details; what their
 # columns are, and in which unit; and what must be known of these.
@@ -46,20 +44,15 @@ def applies(results: Results) -> bool:
 
 def verdicts(results: Results) -> Iterator[str]:
     """One a display: the methods that receive all planes or views, or that the question names, best first."""
-    score, at_once = results.headline, results.facts.labels("stacked")
+    at_once = results.facts.labels("stacked")
     chosen = dict.fromkeys([*(label for label in results.labels if label in at_once), *subjects(results)])
     for condition in results.conditions:
-        tests = [(label, test) for label in chosen if (test := results.tested(label, condition))]
-        tests.sort(key=lambda each: each[1].estimate.mean, reverse=score.higher_is_better)
-        parts = [
-            f"{label} (of {_made_of(results, label)}) {difference(score, test.estimate)}"
-            + ", not shown" * (verdict(score, test) not in ("better", "worse"))
-            for label, test in tests
-        ]
-        if parts:
-            yield f"{condition}, against {results.baseline}: {'; '.join(parts)}."
-        elif rows := results.methods(condition):
-            yield f"{condition}: {'; '.join(f'{label} {value(results, label, condition)}' for label in rows)}."
+        tests = [test for label in chosen if (test := results.tested(label, condition))]
+        sentences = [*compared(results, tests)]
+        if not sentences:
+            means = [f"{label} {value(results, label, condition)}" for label in results.methods(condition)]
+            sentences = [f"{', '.join(means)}."] * bool(means)
+        yield f"{f'{condition}: ' * (len(results.conditions) > 1)}{' '.join(sentences)}" * bool(sentences)
 
 
 def _made_of(results: Results, label: str) -> str:

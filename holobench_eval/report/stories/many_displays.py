@@ -23,19 +23,17 @@ from ..charts import paired
 from ..charts.family import draw_map
 from ..charts.look import looks
 from ..markdown import Markdown, table_of
+from ..phrases import effect
 from ..results import Results
 from ..statistics import FEWEST_DISPLAYS, Array, Estimate, cause, two_way
-from ..story import Part, Report, is_many, subjects
+from ..story import Report, is_many, subjects
 from ..text import words
 from .comparison import published
 from .error_budget import budgets
 
 ORDER = 70
 QUESTION = "On how many of the displays is a method better than the baseline, and by how much over all of them?"
-LIMITS = (
-    "Displays: drawn from assumed ranges, so that an interval over them speaks for displays of these ranges. "
-    "Better and worse are shown by one family of tests over all methods and displays.",
-)
+LIMITS = ("Family: the displays are drawn from assumed ranges, and an interval over them speaks for such displays.",)
 MOST = 2  # methods that the answer names beside those of the question
 MOST_DRAWN = 5  # in the map
 
@@ -77,11 +75,11 @@ def margins(results: Results) -> list[Margin]:
             own, other = ([results.values(row, name) for name in where] for row in (label, baseline))
             differences = np.subtract(own, other)
             tests = [test for test in results.tests.values() if test.second == label and test.condition in where]
-            clear = [sign * test.estimate.mean for test in tests if test.is_shown]
+            effects = [effect(results.headline, test) for test in tests]
             values, by_cluster = differences.mean(1), differences @ shares
             low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
             over_both = Estimate(*two_way(by_cluster), *by_cluster.shape)
-            better, worse = sum(gain > 0 for gain in clear), sum(gain < 0 for gain in clear)
+            better, worse = effects.count("better"), effects.count("worse")
             rows.append(Margin(label, values, low, median, high, over_both, better, worse))
     return sorted(rows, key=lambda row: -sign * row.over_both.mean)
 
@@ -89,46 +87,38 @@ def margins(results: Results) -> list[Margin]:
 def verdicts(results: Results) -> Iterator[str]:
     """The methods of the question; which is best, and what tells it; the best ones; what decides their margins; what
     judges their models; where no score could be had."""
-    rows, where, score = margins(results), shown_on(results), results.headline
+    rows, where = margins(results), shown_on(results)
     if not rows:
         yield "No display has a score of every method for every target."
         return
-    about = [row for label in subjects(results) for row in rows if row.label == label]
-    for row in about:
-        margin, text = published(results, row.label, results.conditions[0]), _beats(results, row, len(where))
-        if margin is not None:
-            above = int((row.values >= margin).sum())
-            has = f"{above or 'none'} {'has' if above < 2 else 'have'}"
-            text += f"; {has} the published {score.with_unit(margin, signed=True)}"
-        yield f"{text}."
-    yield from _best(results)
-    if others := [row for row in rows if row not in about][:MOST]:
-        yield f"{'; '.join(_beats(results, row, len(where)) for row in others)}."
-    if parts := [f"{name} in {right} of {pairs}" for name, (right, pairs) in judged(results).items()]:
-        yield f"Of two methods on a display, that of the better model is the better one: by {words(parts)} pairs."
+    about, count = [row for label in subjects(results) for row in rows if row.label == label], len(where)
+    yield from (_beats(results, row, count) for row in about)
+    if len(rows) > 1:
+        yield from _best(results)
+        yield from (_beats(results, row, count) for row in [row for row in rows if row not in about][:MOST])
+    if parts := [f"in {right} of {pairs} pairs by {name}" for name, (right, pairs) in judged(results).items()]:
+        yield f"Of two methods on a display, that with the better model is better {words(parts)}."
     known = parameters(results)
     for row in about or rows[:1]:
-        if decides := cause(row.values, known):
-            share = f"R2 {max(decides.explained, 0.0):.2f} of displays left out"
-            clear = f"{decides.parameter} (rank correlation {decides.rho:+.2f}, {share})"
-            of = f"the margin of {row.label}"
-            yield (
-                f"What decides {of}: {clear}."
-                if decides.is_clear
-                else f"No parameter of the displays predicts {of} (the best is {decides.parameter}, {share})."
-            )
+        if (decides := cause(row.values, known)) and decides.is_clear:
+            share = f"rank correlation {decides.rho:+.2f}, R2 {decides.explained:.2f} on displays left out"
+            yield f"{decides.parameter.capitalize()} decides the margin of {row.label}: {share}."
+        elif decides:
+            yield f"No parameter of the displays predicts the margin of {row.label}."
     if left := [name for name in results.conditions if name not in where]:
         yield f"Left out, since scores are missing: {words(left)}."
 
 
 def _beats(results: Results, row: Margin, count: int) -> str:
-    score = results.headline
-    worse = f" and loses on {row.worse}" if row.worse else ""
-    return (
-        f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: "
-        f"median {score.with_unit(row.median, signed=True)}, {score.number(row.low, signed=True)} to "
-        f"{score.number(row.high, signed=True)} on nine in ten"
-    )
+    score, worse = results.headline, f" and loses on {row.worse}" * bool(row.worse)
+    ends = " to ".join(score.number(end, signed=True) for end in (row.low, row.high))
+    text = f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: median "
+    text += f"{score.with_unit(row.median, signed=True)}, nine in ten {ends}."
+    margin = published(results, row.label, results.conditions[0])
+    if margin is None:
+        return text
+    above = int((row.values >= margin).sum())
+    return f"{text} The published {score.with_unit(margin, signed=True)} is reached on {above or 'none'}."
 
 
 def gains(results: Results) -> pd.DataFrame:
@@ -142,21 +132,16 @@ def _best(results: Results) -> Iterator[str]:
     gained, known, score = gains(results), display_map(results), results.headline
     count, best = len(gained), gained.idxmax(axis=1).value_counts().reindex(gained.columns, fill_value=0)
     usual = str(best.idxmax())
+    yield f"Best on most displays: {usual}, on {best[usual]} of {count}."
     if known:
-        named = f"names the best method on {known.hits} of {count} displays left out"
-        cost, behind = known.behind(gained[usual]), known.behind(known.chosen)
-        always, asked = score.with_unit(cost), score.with_unit(behind)
-        if behind < cost:
-            budget = f"it {named} and costs {asked} on average ({usual} always: {always})"
-            yield f"To choose, measure an error budget: {budget}."
-        else:
-            nothing = f"always taking {usual} costs {always} on average"
-            yield f"To choose, measure nothing: {nothing}. An error budget {named} and costs {asked}."
-    yield f"{usual} is best on {best[usual]} of {count}."
-    labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
-    if known and labels:
-        shares = words([f"{max(known.explained(label), 0):.2f} of {label}" for label in labels])
-        yield f"Its parts ({'; '.join(map(str, known.shares))}) predict margins on displays left out: R2 {shares}."
+        always, asked = (known.behind(margins) for margins in (gained[usual], known.chosen))
+        nothing, budget = f"always taking {usual} costs {score.with_unit(always)}", f"costs {score.with_unit(asked)}"
+        how = "an error budget" if asked < always else "nothing"
+        named = f"an error budget names the best method on {known.hits} of {count} displays left out and {budget}"
+        yield f"To choose, measure {how}: {nothing} in the mean; {named}."
+        labels = [label for label in dict.fromkeys([*subjects(results), usual]) if label != results.baseline]
+        shares = words([f"{max(known.explained(label), 0):.2f} for {label}" for label in labels])
+        yield f"An error budget predicts margins on displays left out with R2 {shares}."
 
 
 @dataclass(frozen=True)
@@ -273,9 +258,11 @@ def table(board: Board) -> Markdown | None:
     )
 
 
-def _figures(report: Report) -> Iterator[tuple[Path, str]]:
+def figures(report: Report) -> Iterator[tuple[Path, str]]:
     """Margins, and margins against what an error budget found, of the best methods and those of the question."""
     results, path = report.results, report.figures / "quality-displays.png"
+    if not (applies(results) and shown_on(results)):
+        return
     known, baseline, looked = margins(results), results.baseline, looks(results.names)
     rows = [paired.Row(row.label, row.values, row.over_both, looked[row.label]) for row in known]
     figures = {row.label: published(results, row.label, results.conditions[0]) for row in known}
@@ -295,6 +282,3 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
             f"Differences to {baseline}, a mark a display, against two parts of its error, as error "
             "budgets of the displays found them. Lines: least squares, for the eye.",
         )
-
-
-PARTS = (Part(4, applies=lambda report: applies(report.results) and bool(shown_on(report.results)), figures=_figures),)

@@ -15,16 +15,15 @@ from ...core.errors import UserError
 from ...core.io import read_text
 from ...study.plan import is_reference
 from ..board import board
-from ..charts import paired
 from ..charts.tiles import draw_rows
 from ..facts import FLOOR
 from ..markdown import REPORT, Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
-from ..phrases import edited, remarks, too_few, uncovered
+from ..phrases import edited, remarks, uncovered
 from ..results import DONE, MOST_BYTES, Results
 from ..statistics import FEWEST, POWER, SIGNIFICANCE
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
-from ..text import FILES, grouped, plain, sample, words
-from . import answer, comparison, many_displays, story_of
+from ..text import FILES, grouped, plain, words
+from . import answer, comparison, stories, story_of
 from .alignment import agreement
 from .training import trainings
 
@@ -33,7 +32,7 @@ PICTURES = "answer-pictures.jpg"
 MOST_TILES = 6  # in the row of pictures, beside the target
 MOST_NAMED = 4  # displays of one basis
 FIRST = 5  # limits that stand in report.md; the others are in details.md
-TARGETS_NAMED = 40
+TARGETS_NAMED = 8
 WEIGHTS = "https://download.pytorch.org/models/alexnet-owt-7be5be79.pth"
 
 
@@ -52,11 +51,11 @@ def _table(report: Report, _: Figures) -> Blocks:
     return [getattr(story_of(report.results), "table", comparison.table)(board(report.results))]
 
 
-def _plots(report: Report, some: slice) -> Iterator[tuple[Path, str]]:
-    """Differences to the baseline on some of the displays that have any."""
-    for condition, stem in paired.displays(report.results)[some]:
-        path = report.figures / f"quality-paired-{stem}.png"
-        yield path, paired.draw(report.results, condition, path)
+def _figures(report: Report) -> list[tuple[Path, str]]:
+    """The figures of numbers of all stories, that of the study's own first, which alone stands in report.md."""
+    own = story_of(report.results)
+    drawn = dict.fromkeys([own, comparison, *stories()] if hasattr(own, "figures") else [comparison, *stories()])
+    return [figure for story in drawn if hasattr(story, "figures") for figure in story.figures(report)]
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
@@ -112,46 +111,38 @@ def _parts(report: Report, _: Figures) -> Blocks:
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
-    known = limits(report)
-    more = Markdown("[{} more](details.md#limits)").format(len(known) - FIRST)
-    return [heading("Limits"), bullets([*known[:FIRST], *[more] * (len(known) > FIRST)])]
+    first, more = limits(report)
+    link = Markdown("[{} more](details.md#limits)").format(len(more))
+    return [heading("Limits"), bullets([*first, *[link] * bool(more)])]
 
 
 def _more_limits(report: Report, _: Figures) -> Blocks:
     yield heading("Limits")
     if report.results.study.would_change:
         yield Markdown("**What would change the answer.** {}").format(report.results.study.would_change)
-    yield bullets(limits(report)[FIRST:])
+    yield bullets(limits(report)[1])
 
 
-def limits(report: Report) -> list[Markdown]:
-    """How far the answer goes, what matters most first: the sample, the displays, who has the form of the bench, and
-    what was tuned on what."""
+def limits(report: Report) -> tuple[list[Markdown], list[Markdown]]:
+    """How far the answer goes, what matters most first, and the rest: the sample, the displays, who has the form of the
+    bench; then what was tuned on what."""
     study, own = report.results.study, getattr(story_of(report.results), "LIMITS", ())
     given = {"Measured": report.results.text.caution, "Published": study.reported and f"{study.reported.source}."}
     given["Note"] = study.note
-    texts = [*remarks(report.results), _sample(report), *_form(report), *own, *_displays(report)]
+    texts = [*remarks(report.results), *filter(None, [uncovered(report.records), edited(report.records)])]
+    texts += [_sample(report), *_displays(report), *_form(report), *own]
     texts += [f"{name}: {text}" for name, text in given.items() if text]
-    texts += filter(None, [uncovered(report.records), edited(report.records)])
-    texts += [*_weights(report), *_tuned(report), *_seconds(report), *_lpips(report)]
-    return [Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in texts]
+    first, more = texts[:FIRST], [*texts[FIRST:], *_weights(report), *_tuned(report), *_lpips(report)]
+    named = [[Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in some] for some in (first, more)]
+    return named[0], named[1]
 
 
 def _sample(report: Report) -> str:
     results, targets = report.results, len(report.results.targets)
-    trained = ", nor with another training" * bool(report.once(trainings))
+    trained = " or trainings" * bool(report.once(trainings))
     size = f"{targets} target{'s' * (targets != 1)}{_among(results)}"
-    kind = "of how a mean varies with other pictures of the kind, not with other displays"
-    parts = [f"{size}; brackets are {kind}{trained}."]
-    tests = sum(np.isfinite(test.p) for test in results.tests.values())
-    if few := too_few(results):
-        parts.append(few)
-    elif tests:
-        parts.append(
-            f"Shown: p < {SIGNIFICANCE} by sign flips, adjusted for {tests} comparison{'s' * int(tests > 1)} with "
-            f"{results.baseline}; not shown does not mean that there is none."
-        )
-    elif len(set(results.clusters)) < FEWEST:
+    parts = [f"{size}. Brackets: how a mean varies with other pictures of the kind, not with other displays{trained}."]
+    if len(set(results.clusters)) < FEWEST:
         parts.append(f"Fewer than {FEWEST} clusters give no interval and no test.")
     if holes := int((results.holes["category"] != FLOOR).sum()):
         parts.append(f"{holes} planned cells have no score (details.md says why).")
@@ -165,9 +156,13 @@ def _among(results: Results) -> str:
 
 
 def _displays(report: Report) -> Iterator[str]:
-    displays = report.description.displays
-    for basis, names in grouped((each.basis or each.heading, each.name) for each in displays).items():
-        yield f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
+    same = grouped((each.basis or each.heading, each.name) for each in report.description.displays)
+    known = [
+        f"{words(names) if len(names) <= MOST_NAMED else f'{len(names)} displays'}: {basis.rstrip('.')}."
+        for basis, names in same.items()
+    ]
+    if known:
+        yield f"Displays: {' '.join(known)}"
     for label, model in report.description.models.items():
         yield f"{label}: descends through {model}."
     if report.results.study.measure == FILES:
@@ -182,12 +177,10 @@ def _form(report: Report) -> Iterator[str]:
         for label, share in display.modelled.items()
         if share[0] and label in report.results.methods(display.name)
     )
-    ends = {
-        label: dict.fromkeys(f"{own} of {of}" for own, of in (min(each), max(each))) for label, each in shares.items()
-    }
-    known = grouped((" to ".join(both), label) for label, both in ends.items())
-    if parts := [f"{words(labels)} for {count}" for count, labels in known.items()]:
-        yield f"Inverse crime: effects modelled by the simulation's own equations: {'; '.join(parts)}; expect less."
+    ends = {label: f"{'up to ' * (len({*each}) > 1)}{max(each)[0]} of {max(each)[1]}" for label, each in shares.items()}
+    known = grouped((count, label) for label, count in ends.items())
+    if parts := [f"{words(labels)} {count}" for count, labels in known.items()]:
+        yield f"Inverse crime: effects of a display that models have in its equations: {'; '.join(parts)}. Expect less."
 
 
 def _tuned(report: Report) -> Iterator[str]:
@@ -208,18 +201,6 @@ def _weights(report: Report) -> Iterator[str]:
         lacking |= {(absent, label): None for label in asked}
     for absent, labels in grouped(lacking).items():
         yield f"Weights: without {words(list(absent))}, which this machine has not, learned {words(labels)}."
-
-
-def _seconds(report: Report) -> Iterator[str]:
-    """Whether solutions were timed beside other work."""
-    done, workers = report.results.done, int(report.provenance.get("workers") or 1)
-    alone = done["timed_alone"] == 1 if "timed_alone" in done else np.zeros(len(done), dtype=bool)
-    if alone.any():
-        beside = sorted({*done["label"][done["category"] != FLOOR]} - {*done["label"][alone]})
-        but = f", but for {words(beside)}" * bool(beside)
-        yield f"Seconds: of holograms that were solved with nothing beside them{but}."
-    elif workers > 1:
-        yield f"Seconds: of {workers} workers side by side, so longer than alone."
 
 
 def _lpips(report: Report) -> Iterator[str]:
@@ -306,6 +287,9 @@ def _registration(results: Results) -> str:
         for condition, cells in done.groupby(named, sort=False)["registration_residual_px"]
         if cells.notna().any()
     ]
+    if is_many(results):
+        ends = done["registration_residual_px"]
+        residuals = [f"{len(results.conditions)} displays {ends.min():.3f} to {ends.max():.3f} px"]
     text = f"rms residual, in pixels of the scored region: {', '.join(residuals)}" if residuals else "not recorded"
     return f"{text}. {agreement(results)}" if results.study.display.real else text
 
@@ -321,18 +305,30 @@ def _described(report: Report, _: Figures) -> Blocks:
     displays = report.description.displays
     yield heading("Displays and methods")
     yield report.results.text.displays if displays else "No description of the displays was recorded."
-    for display in displays:
-        yield heading(f"Display {display.name}", 3)
-        yield display.heading
-        yield bullets(display.lines)
+    for lines, same in grouped((display.lines, display) for display in displays).items():
+        several = len(same) > 1
+        yield heading(f"{len(same)} displays" if several else f"Display {same[0].name}", 3)
+        yield bullets(f"{each.name}: {each.heading}" for each in same) if several else same[0].heading
+        yield bullets(lines)
     yield heading("Methods", 3)
-    # label, registered name and parameters of each, in the order of the tables
     cells, rows, known = {record["label"]: record["cell"] for record in report.records}, [], report.results.table
+    firsts = dict[str, tuple[str, dict[str, object]]]()  # of each registered method
     for label in known.loc[known["category"] != FLOOR, "label"].unique():
         cell = cells[label]
+        own = _flat(cell["params"])
+        first, others = firsts.setdefault(cell["method"], (label, own))
+        changed = {name: value for name, value in own.items() if label == first or value != others.get(name)}
         limit = f"; at most {cell['captures']} captures per target" if cell.get("captures") else ""
-        rows.append([label, code(cell["method"]), f"{plain(cell['params'])}{limit}"])
+        rows.append([label, code(cell["method"]), f"{f'as {first}: ' * (label != first)}{plain(changed)}{limit}"])
     yield table(["method", "registered as", "parameters"], rows)
+
+
+def _flat(params: Mapping[str, object], before: str = "") -> dict[str, object]:
+    """Parameters with those of parameters, their names joined by dots."""
+    flat = dict[str, object]()
+    for name, value in params.items():
+        flat |= _flat(value, f"{before}{name}.") if isinstance(value, Mapping) else {f"{before}{name}": value}
+    return flat
 
 
 def _tests(report: Report, _: Figures) -> Blocks:
@@ -344,30 +340,23 @@ def _tests(report: Report, _: Figures) -> Blocks:
         yield "There are no comparisons with a baseline."
         return
     yield (
-        f"Differences to the baseline {report.results.baseline}, target by target, repeats averaged first: "
-        f"{score.axis}{report.results.text.axis}. Two-sided sign-flip min-p test (step-down) over "
-        f"clusters of targets; each p is adjusted for all {sum(np.isfinite(test.p) for test in tests)} tests of this "
-        "table, in which the oracle has none; intervals are not adjusted. At "
-        f"p >= {SIGNIFICANCE} a difference is not shown, which does not mean that there is none. "
-        f'"Could show": what a test of this comparison alone shows with {100 * POWER:.0f} % power. '
-        f"Pairs with a hole are omitted and counted. Fewer than {FEWEST} clusters give no test and no interval."
+        f"Differences to the baseline {results.baseline}, target by target, repeats averaged first: {score.axis}"
+        f"{results.text.axis}. Two-sided sign-flip min-p test (step-down) over clusters of targets; each p is adjusted "
+        f"for all {sum(np.isfinite(test.p) for test in tests)} tests, intervals are not; shown: p < {SIGNIFICANCE}. "
+        f'"Could show": what a test of this comparison alone shows with {100 * POWER:.0f} % power. tests.csv has all.'
     )
-    yield table_of(
-        [
-            {
-                "comparison": f"{marked(test.second)} – {marked(test.first)}",
-                "display": test.condition,
-                "complete pairs": sample(test.estimate, len(results.targets)),
-                f"mean difference{score.brackets}": score.estimate(test.estimate, signed=True),
-                f"median{score.brackets}": score.number(test.median, signed=True),
-                "better on": f"{test.better(score.sign)} of {test.estimate.n}",
-                f"could show{score.brackets}": score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
-                "p": "no test" if np.isnan(test.p) else f"{test.p:.4f}",
-                "difference": "–" if np.isnan(test.p) else "shown" if test.is_shown else "not shown",
-            }
-            for test in tests
-        ]
-    )
+    rows = [
+        {
+            "method": marked(test.second),
+            "display": test.condition,
+            f"mean difference{score.brackets}": score.estimate(test.estimate, signed=True),
+            "better on": f"{test.better(score.sign)} of {test.estimate.n}",
+            f"could show{score.brackets}": score.number(np.nan if np.isnan(test.p) else test.estimate.detectable),
+            "p": "no test" if np.isnan(test.p) else f"{test.p:.4f}",
+        }
+        for test in ([] if is_many(results) else tests)
+    ]
+    yield table_of(rows)
 
 
 def _holes(report: Report, _: Figures) -> Blocks:
@@ -416,32 +405,20 @@ def _has_scores(report: Report) -> bool:
     return _has_displays(report) and values is not None and bool(np.isfinite(values).any())
 
 
-def _has_plot(report: Report) -> bool:
-    own = report.results.study.measure == "error_budget" or any(part.applies(report) for part in many_displays.PARTS)
-    return _has_scores(report) and not own
-
-
-ANSWER = Part(2, _answer, applies=_has_displays)
-LIMITATIONS = Part(75, _limits, applies=_has_displays)
 PARTS = (
     Part(0, _title),
-    ANSWER,
+    Part(2, _answer, applies=_has_displays),
     Part(3, _table, applies=_has_scores),
-    Part(4, applies=_has_plot, figures=lambda report: _plots(report, slice(1))),
+    Part(4, applies=_has_scores, figures=lambda report: report.once(_figures)[:1]),
     Part(6, applies=_has_scores, figures=_typical),
     Part(74, _parts, applies=_has_parts),
-    LIMITATIONS,
+    Part(75, _limits, applies=_has_displays),
     Part(210, _reproduce),
     Part(1, _details, details=True),
     Part(5, _more_limits, applies=_has_displays, details=True),
     Part(10, _setup, details=True),
     Part(20, _described, applies=lambda report: report.results.study.measure != FILES, details=True),
-    Part(
-        30,
-        applies=lambda report: _has_scores(report) and not is_many(report.results),
-        figures=lambda report: _plots(report, slice(1, None)),
-        details=True,
-    ),
+    Part(30, applies=_has_scores, figures=lambda report: report.once(_figures)[1:], details=True),
     Part(90, figures=_stages, details=True),
     Part(120, _tests, details=True),
     Part(190, _holes, details=True),

@@ -15,11 +15,12 @@ from ...metrics.control import MOST
 from .. import markdown
 from ..board import Board
 from ..markdown import Markdown
-from ..phrases import value, verdict
+from ..phrases import effect, value
 from ..results import Results
 from ..scores import Score
 from ..story import is_many, subjects
 from ..text import grouped, words
+from .comparison import EFFECTS
 from .comparison import table as board_table
 
 ORDER = 30
@@ -40,12 +41,13 @@ def verdicts(results: Results) -> Iterator[str]:
         for first, leads in Counter(firsts).most_common(1):
             known = _means(results, first, score)
             mean, where = score.with_unit(float(np.mean(known))), f"{leads} of {count} displays"
-            yield f"By {score.title} {first} leads on {where}; its mean over {len(known)} is {mean}."
+            yield f"By {score.title}, {first} leads on {where}, with {mean} in the mean over {len(known)}."
     for condition in () if is_many(results) else results.conditions:
         if ranking := results.ranking(condition):
-            parts = [f"{ranking[0]} predicts best ({value(results, ranking[0], condition)})"]
-            parts += [*_controls(results, condition), *_named(results, condition), *_reported(results, condition)]
-            yield f"{f'{condition}: ' * (count > 1)}{'; '.join(parts)}."
+            best = f"Best: {ranking[0]}, {value(results, ranking[0], condition)}."
+            sentences = [*_reported(results, condition), *_named(results, condition), best]
+            sentences += _controls(results, condition)
+            yield f"{f'{condition}: ' * (count > 1)}{' '.join(sentences)}"
 
 
 def _controls(results: Results, condition: str) -> Iterator[str]:
@@ -53,15 +55,23 @@ def _controls(results: Results, condition: str) -> Iterator[str]:
     for score in results.control:
         for first in results.ranking(condition, score.key)[:1]:
             own, most = (results.values(first, condition, key).mean() for key in (score.key, MOST))
-            yield f"{first} answers changes best (control {score.number(own)} of {score.number(most)})"
+            best = results.ranking(condition)[0]
+            who = (
+                "It also answers a changed hologram best"
+                if first == best
+                else f"To a changed hologram, {first} answers best"
+            )
+            yield f"{who}: control {score.number(own)} of {score.number(most)}."
 
 
 def _named(results: Results, condition: str) -> Iterator[str]:
     """Which networks of the question beat the baseline."""
     tests = [test for label in subjects(results) if (test := results.tested(label, condition))]
-    groups = grouped((verdict(results.headline, test), test.second) for test in tests)
-    if parts := [f"{name}: {words(labels)}" for name, labels in groups.items()]:
-        yield f"than {results.baseline}, {', '.join(parts)}"
+    groups = grouped((effect(results.headline, test), test.second) for test in tests)
+    than = f" than {results.baseline}"
+    for told, words_of in ((name, name.capitalize()) for name in (*EFFECTS,) if name in groups):
+        yield f"{words_of}{than * (told in ('better', 'worse'))}: {words(groups[told])}."
+        than = ""
 
 
 def _reported(results: Results, condition: str) -> Iterator[str]:
@@ -74,7 +84,8 @@ def _reported(results: Results, condition: str) -> Iterator[str]:
     ranked = [label for label in results.ranking(condition) if label in published]
     if len(ranked) > 1 and condition == (results.facts.beside or condition):
         first = max(ranked, key=published.__getitem__)
-        yield f"{first}, published as first of {len(ranked)}, is number {ranked.index(first) + 1}"
+        place, total = ranked.index(first) + 1, len(ranked)
+        yield f"{'No' if place > 1 else 'Yes'}. {first}, published as best of {total}, is number {place} here."
 
 
 def table(board: Board) -> Markdown | None:

@@ -26,10 +26,7 @@ from ..text import bracketed, percent, words
 
 ORDER = 50
 QUESTION = "Does the ranking of the methods survive another bench of the same kind?"
-LIMITS = (
-    "Draws: the bench varies within assumed ranges, target images and holograms stay, and brackets of shares and of "
-    "tau are over draws and not over images.",
-)
+LIMITS = ("Draws: the bench varies within assumed ranges, targets and holograms stay, and brackets are over draws.",)
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take
 # the draws from all others.
@@ -144,15 +141,15 @@ def verdicts(results: Results) -> Iterator[str]:
         yield "Methods with all scores tie before any draw or in each of them, so there is no ranking to compare."
     for each in existing:
         display, score = each.swept.before, results.headline
-        leaders = [label for label in each.methods if each.ranks[label][0] == 1]
+        leader = next(label for label in each.methods if each.ranks[label][0] == 1)
         turned = (pair for pair in each.pairs if pair.flips and score.number(abs(pair.nominal)).strip("0."))
         passes = [
-            f"; {pair.second} passes {pair.first} most often, on {percent(each.share(pair.flips))} %" for pair in turned
+            f" Most often {pair.second} passes {pair.first}, on {percent(each.share(pair.flips))} %." for pair in turned
         ]
         yield (
-            f"{f'{display}: ' * (len(existing) > 1)}{words(leaders)}, first on {display}, is first on "
-            f"{percent(each.first(leaders[0]))} % of its draws; Kendall's tau with its ranking is "
-            f"{bracketed(each.tau, '.2f')}{''.join(passes[:1])}."
+            f"{f'{display}: ' * (len(existing) > 1)}{leader}, best on {display}, is best on "
+            f"{percent(each.first(leader))} % of its draws. Kendall's tau of rankings is "
+            f"{bracketed(each.tau, '.2f')}.{''.join(passes[:1])}"
         )
 
 
@@ -259,7 +256,4 @@ def figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-PARTS = (
-    Part(47, applies=lambda report: applies(report.results), figures=figures),
-    Part(60, _render, applies=lambda report: applies(report.results), details=True),
-)
+PARTS = (Part(60, _render, applies=lambda report: applies(report.results), details=True),)

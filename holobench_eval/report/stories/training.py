@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...core.errors import listed
-from ...display.estimates import QUANTITIES
 from ...study.artifacts import TrainingRecord, training_records
 from ...study.plan import is_reference
 from ..charts.curves import draw_trainings
-from ..markdown import Markdown, bullets, heading, table_of
+from ..markdown import bullets, heading, table_of
 from ..results import DONE
 from ..story import Blocks, Figures, Part, Report, is_many
 from ..text import grouped, number, words
@@ -26,7 +24,6 @@ from ..text import grouped, number, words
 ORDER = 210
 DISPLAY = "the display itself"
 DIGITS = 10  # of a sha256 that are printed
-COLOURS = {None: "all", 0: "red", 1: "green", 2: "blue"}
 MOST = 1e12  # no quantity is anywhere near; a larger number in a stranger's file is no estimate
 T = TypeVar("T")
 
@@ -89,47 +86,45 @@ def _render(report: Report, figures: Figures) -> Blocks:
     yield heading("Training")
     yield (
         "Training took place before any target was seen. Held-out images only monitor it; their captures and their "
-        "time are counted."
+        "time are counted. The folder training has every round, every estimate, and the effects of a display that a "
+        "model cannot represent."
     )
     yield table_of(list(_summary(report)))
-    yield bullets(_doubts(learned))
-    if rounds := table_of(list(_rounds(learned))):
-        yield (
-            "Held-out images after every round, matched in intensity. Predicted: the method's prediction against the "
-            "target. Captured: the capture against the target. Fidelity: the prediction against the capture. Where "
-            "predicted exceeds captured, the prediction promises more than the display shows."
-        )
-    yield rounds or "No figures on held-out images were logged."
+    yield bullets([*_doubts(learned), *(() if is_many(report.results) else _estimated(learned))])
     yield from figures
 
 
 def _summary(report: Report) -> Iterator[dict[str, object]]:
-    """What each training took."""
+    """What the trainings took, those of the same methods in a row."""
     learned, given = report.once(trainings), report.results.facts.training
-    for training in learned:
-        captures, seconds = (training.fact(name, (int, float), math.nan) for name in ("captures", "seconds"))
-        row: dict[str, object] = {"method": training.name, "trained on": training.display}
-        row |= {"captures": number(captures), "seconds": number(seconds)}
+    for labels, same in grouped((each.labels, each) for each in learned).items():
+        rounds = [len(each.record.rounds) if each.record else math.nan for each in same]
+        known = {name: [each.fact(name, (int, float), math.nan) for each in same] for name in ("captures", "seconds")}
+        row: dict[str, object] = {"method": words(list(labels)), "trained on": _on(same)}
+        row |= {name: _ends(values) for name, values in (known | {"rounds": rounds}).items()}
         row |= {"images": given.images - given.held_out if given else "–", "held out": given.held_out if given else "–"}
-        row |= {"rounds": len(training.record.rounds) or "–" if training.record else "–"}
         if any(each.text("perceptual") for each in learned):
-            row |= {"perceptual features": training.text("perceptual") or "none"}
-        yield row | {"learned state, sha256": training.text("sha256")[:DIGITS] or "not trained"}
+            row |= {"perceptual features": same[0].text("perceptual") or "none"}
+        digests = [each.text("sha256")[:DIGITS] or "not trained" for each in same]
+        yield row | {"learned state, sha256": digests[0] if len(same) == 1 else "in training"}
 
 
-def _rounds(learned: Sequence[Training]) -> Iterator[dict[str, object]]:
-    """Every round of every training on held-out images; none where no method logged any."""
+def _on(same: Sequence[Training]) -> str:
+    return same[0].display if len(same) == 1 else f"{len(same)} displays"
+
+
+def _ends(values: Sequence[float]) -> str:
+    """A number, or the least and the most of several."""
+    return " to ".join(dict.fromkeys(number(end) for end in (min(values), max(values))))
+
+
+def _estimated(learned: Sequence[Training]) -> Iterator[str]:
+    """How many quantities of a display each model estimates as well as it states, and what it cannot represent."""
     for training in learned:
-        for step in training.record.rounds if training.record else ():
-            figures = {
-                "PSNR, predicted [dB]": step.predicted,
-                "PSNR, captured [dB]": step.captured,
-                "fidelity [dB]": step.fidelity,
-            }
-            if not all(map(math.isnan, figures.values())):
-                row = {"method": training.name, "round": step.number}
-                row |= {"captures so far": number(step.captures), "seconds so far": number(step.seconds)}
-                yield row | {name: "–" if math.isnan(db) else f"{db:.2f}" for name, db in figures.items()}
+        of = f"{training.name.removesuffix(f' on {training.display}')} on {training.display}"
+        lacks = training.fact("missing", list, [])
+        if rows := list(estimates(training)):
+            yield f"{of}: {verdict(rows)} {len(lacks)} effects of the display are outside its form."
 
 
 def _doubts(learned: Sequence[Training]) -> Iterator[str]:
@@ -162,44 +157,6 @@ def _figures(report: Report) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _diagnosis(report: Report, _: Figures) -> Blocks:
-    learned = report.once(trainings)
-    estimated = [(training, rows) for training in learned if (rows := list(estimates(training)))]
-    if estimated:
-        yield heading("Diagnosis", 3)
-        yield (
-            "Display parameters as the learned models estimate them, in forms that captures determine; in brackets the "
-            "ground truth of the simulated bench, which no method sees. The stated error holds for a model that was "
-            "trained on patterns that reach every level of the panel."
-        )
-    for training, rows in estimated:
-        where = f" on {training.display}"
-        yield Markdown("**{}.** {}").format(training.name.removesuffix(where) + where, verdict(rows))
-        yield quantities(rows)
-    if lacking := missing(learned):
-        yield (
-            "Effects of the benches that the learned models cannot represent, so that no values of their parameters "
-            "describe the display exactly:"
-        )
-        yield bullets(lacking)
-
-
-def missing(learned: Sequence[Training]) -> list[str]:
-    """For every display, what lies outside the form of the models that were trained on it."""
-    stated = ((training, training.fact("missing", list, None)) for training in learned)
-    lists = grouped(
-        ((training.display, *texts), label)
-        for training, texts in stated
-        if texts is not None and all(isinstance(text, str) for text in texts)
-        for label in training.labels
-    )
-    return [
-        f"{display} contains {'effects' if texts else 'no effect'} that {listed(dict.fromkeys(labels))} cannot "
-        f"represent{': ' * bool(texts)}{'; '.join(texts)}."
-        for (display, *texts), labels in lists.items()
-    ]
-
-
 def estimates(training: Training) -> Iterator[dict[str, Any]]:
     """The estimates of a training with their truths and stated errors, NaN where a stranger's file has no number, and
     how far estimate and truth are ``apart``, phases in rad by the shorter way around."""
@@ -218,31 +175,6 @@ def _number(value: object) -> float:
     return math.nan
 
 
-def quantities(rows: Sequence[Mapping[str, Any]]) -> Markdown | None:
-    """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth; of what no capture
-    shows, neither."""
-    colours: list[int | None] = sorted({row["colour"] for row in rows if row["colour"] is not None})
-    if colours == [0]:  # of the only laser
-        rows, colours = [{**row, "colour": None} for row in rows], []
-    if any(row["colour"] is None for row in rows):
-        colours.append(None)
-    has_truth, lines = any(not math.isnan(row["truth"]) for row in rows), []
-    for name, same in grouped((row["name"], row) for row in rows).items():
-        first, cells, off = same[0], dict.fromkeys(colours, ""), [-1.0]
-        for row in same:
-            truth = "–" if math.isnan(row["truth"]) else f"{row['truth']:.3f}"
-            seen = row.get("seen") is not False
-            cells[row["colour"]] = f"{row['value']:.3f}{f' ({truth})' * has_truth}" if seen else "–"
-            off += [row["apart"]] * (seen and not math.isnan(row["apart"]))
-        line = {"quantity": QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")}
-        line |= {"unit": first["unit"] or ""}
-        line |= {COLOURS.get(colour, f"colour {colour}"): cell for colour, cell in cells.items()}
-        line["largest difference"] = f"{max(off):.3f}" if off[1:] else "–"
-        stated = "–" if math.isnan(first["error"]) else f"{first['error']:.2g}"
-        lines.append(line | {"stated error": "not seen" if first.get("seen") is False else stated})
-    return table_of(lines)
-
-
 def verdict(rows: Sequence[Mapping[str, Any]]) -> str:
     """Whether the numbers are as near to the truth as is stated."""
     judged = [row for row in rows if not math.isnan(row["apart"] + row["error"])]
@@ -257,8 +189,4 @@ def verdict(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-PARTS = (
-    Part(100, _render, applies=lambda report: bool(report.once(trainings)), figures=_figures, details=True),
-    # Of many displays these tables are too long to be read; training/*.json has their numbers.
-    Part(110, _diagnosis, applies=lambda report: not is_many(report.results), details=True),
-)
+PARTS = (Part(100, _render, applies=lambda report: bool(report.once(trainings)), figures=_figures, details=True),)
