@@ -255,7 +255,7 @@ def table(board: Board) -> Markdown | None:
     score, lines = results.headline, dict[tuple[str, str], dict[str, object]]()
     labels = dict.fromkeys(label for _, _, label in sweeps(results))
     for (display, kind, label), points in sweeps(results).items():
-        line = {"change": KINDS[kind].words, "display": display} if several else {"change": KINDS[kind].words}
+        line: dict[str, object] = {"change": KINDS[kind].words, **({"display": display} if several else {})}
         row = lines.setdefault((display, kind), line | dict.fromkeys(labels, "–"))
         for worst, loss in _lost(points)[:1]:
             row[label] = f"{score.number(loss.mean)} at {worst.text}"
