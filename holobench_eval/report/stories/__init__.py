@@ -6,6 +6,7 @@ A story is a module of this folder with these names, all optional but the first:
 - ``QUESTION``: what such a study asks, for a config that states no question; with ``applies(results)``, whether a
   study is of this kind, and ``verdicts(results)``, each of at most ``MOST_WORDS`` words, for each display or for all.
 - ``table(board)``: what the verdicts rest on, None where there is nothing to show; by default the board.
+- ``TESTS``: False where its verdicts rest on no test of two methods.
 - ``LIMITS``: how far such an answer goes, each a name, a colon and a sentence.
 - ``PARTS``: what it adds to the two texts, whatever the study asks.
 """
@@ -39,7 +40,9 @@ def answer(results: Results) -> list[str]:
     """The verdicts of the study's own story; a sentence in their place where no score allows one."""
     if not results.conditions or results.done.empty:
         return ["No cell of the study has a score, so there is no answer."]
-    verdicts = [verdict for verdict in (too_few(results), *story_of(results).verdicts(results)) if verdict]
+    story = story_of(results)
+    few = too_few(results) if getattr(story, "TESTS", True) else ""
+    verdicts = [verdict for verdict in (few, *story.verdicts(results)) if verdict]
     named = mentioned(results.labels, " ".join(verdicts))
     if silent := [label for label in subjects(results) if label not in named]:
         verdicts[:0] = [f"Nothing is said of {words(silent)}: a score is missing, of a target or of the baseline."]

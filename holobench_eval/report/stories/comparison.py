@@ -114,10 +114,10 @@ def _best(results: Results, display: Display) -> Iterator[str]:
     groups = {(rows[0].category, rows[0].frames > 1): rows for rows in complete}
     single = [rows for (category, several), rows in groups.items() if category not in (ONLINE, ORACLE) and not several]
     first = max(single, key=lambda rows: results.headline.sign * rows[0].score.mean, default=[])
-    blind = [] if first is groups.get((OPEN_LOOP, False)) else groups.get((OPEN_LOOP, False), [])
+    blind = groups.get((OPEN_LOOP, False), []) if first is groups.get((CALIBRATED, False)) else []
     places = (
         (first, f"Best{_among(results, first)}"),
-        (blind if first is groups.get((CALIBRATED, False)) else [], "Without a camera"),
+        (blind if blind and blind[0].test else [], "Without a camera"),
         (groups.get((OPEN_LOOP, True), []), "With several frames"),
         (groups.get((ONLINE, False), []), "With photographs of the picture itself"),
     )
@@ -133,7 +133,8 @@ def _best(results: Results, display: Display) -> Iterator[str]:
                 mean = results.headline.with_unit(row.test.estimate.mean, signed=True)
                 is_known = rows is first and verdict(results.headline, row.test) != UNSHOWN
                 parts.append(f"{difference(results.headline, row.test.estimate) if is_known else mean}{against}")
-                parts += [UNSHOWN] * (verdict(results.headline, row.test) == UNSHOWN)
+                told = verdict(results.headline, row.test)
+                parts += [{UNSHOWN: UNSHOWN, "not tested": "untested"}[told]] * (told in (UNSHOWN, "not tested"))
                 against = ""
             parts += [row.camera.replace(" ", " photographs ", 1)] if row.photographs else []
             yield f"{where}: {', '.join(parts)}."
@@ -159,7 +160,8 @@ def table(board: Board) -> Markdown | None:
     """The board of each display; of more rows than a reader takes in, a row a method and a column a display."""
     count = sum(len(display.rows) for display in board.displays)
     drawn = boards(board) if count <= MOST_ROWS else [_matrix(board)]
-    return blocks([*drawn, legend(board)]) if board.displays else None
+    star = "*: no better than gray." if count > MOST_ROWS else None
+    return blocks([*drawn, star, legend(board)]) if board.displays else None
 
 
 def boards(board: Board) -> list[object]:
@@ -186,7 +188,6 @@ def legend(board: Board) -> str:
     if any(row.test and verdict(results.headline, row.test) == UNSHOWN for row in rows):
         count = sum(not np.isnan(test.p) for test in results.tests.values())
         texts.append(f"°: {UNSHOWN} (p ≥ {SIGNIFICANCE:g}, adjusted for {count} comparisons).")
-    texts += ["*: no better than gray."] * any("no better than gray" in row.marks for row in rows)
     texts += [f"A gray picture scores {'; '.join(gray)}."] * bool(gray)
     texts += [CONTROL] * bool(results.control)
     return " ".join([*texts, "Brackets: 95 % intervals."])

@@ -33,6 +33,7 @@ from .comparison import CONTROL
 
 ORDER = 10
 QUESTION = "Where does the error of the captures come from, and who can remove it?"
+TESTS = False
 LIMITS = (
     "Bounds: a part is what a prediction explains and none before it does; a hologram gains less from it than its dB.",
     "Parts: image-domain terms are a tone curve, shading, blur and haze, fitted on training captures.",

@@ -111,30 +111,38 @@ def _parts(report: Report, _: Figures) -> Blocks:
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
-    first, more = limits(report)
-    link = Markdown("[{} more](details.md#limits)").format(len(more))
-    return [heading("Limits"), bullets([*first, *[link] * bool(more)])]
+    known, first = limits(report), _first(report)
+    more = Markdown("[{} more](details.md#limits)").format(len(known) - first)
+    return [heading("Limits"), bullets([*known[:first], *[more] * (len(known) > first)])]
 
 
 def _more_limits(report: Report, _: Figures) -> Blocks:
     yield heading("Limits")
     if report.results.study.would_change:
         yield Markdown("**What would change the answer.** {}").format(report.results.study.would_change)
-    yield bullets(limits(report)[1])
+    yield bullets(limits(report)[_first(report) :])
 
 
-def limits(report: Report) -> tuple[list[Markdown], list[Markdown]]:
-    """How far the answer goes, what matters most first, and the rest: the sample, the displays, who has the form of the
-    bench; then what was tuned on what."""
-    study, own = report.results.study, getattr(story_of(report.results), "LIMITS", ())
-    given = {"Measured": report.results.text.caution, "Published": study.reported and f"{study.reported.source}."}
-    given["Note"] = study.note
-    texts = [*remarks(report.results), *filter(None, [uncovered(report.records), edited(report.records)])]
-    texts += [_sample(report), *_displays(report), *_form(report), *own]
-    texts += [f"{name}: {text}" for name, text in given.items() if text]
-    first, more = texts[:FIRST], [*texts[FIRST:], *_weights(report), *_tuned(report), *_lpips(report)]
-    named = [[Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in some] for some in (first, more)]
-    return named[0], named[1]
+def _first(report: Report) -> int:
+    """How many of the limits stand in report.md; the others are in details.md."""
+    return min(FIRST, len(list(_bounds(report))))
+
+
+def limits(report: Report) -> list[Markdown]:
+    """How far the answer goes, what matters most first, and what settings and weights it rests on."""
+    texts = [*_bounds(report), *_weights(report), *_tuned(report), *_lpips(report)]
+    return [Markdown("**{}:** {}").format(*text.split(": ", 1)) for text in texts]
+
+
+def _bounds(report: Report) -> Iterator[str]:
+    """What is odd, the sample, the displays, who has the form of the bench, and what the study's own story adds."""
+    study = report.results.study
+    yield from (*remarks(report.results), *filter(None, [uncovered(report.records), edited(report.records)]))
+    yield from (_sample(report), *_displays(report), *_form(report))
+    yield from getattr(story_of(report.results), "LIMITS", ())
+    published = f"{study.reported.source}." if study.reported else ""
+    given = {"Measured": report.results.text.caution, "Published": published, "Note": study.note}
+    yield from (f"{name}: {text}" for name, text in given.items() if text)
 
 
 def _sample(report: Report) -> str:

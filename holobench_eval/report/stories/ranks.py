@@ -26,6 +26,7 @@ from ..text import bracketed, percent, words
 
 ORDER = 50
 QUESTION = "Does the ranking of the methods survive another bench of the same kind?"
+TESTS = False
 LIMITS = ("Draws: the bench varies within assumed ranges, targets and holograms stay, and brackets are over draws.",)
 
 # Share of the draws in which a method needs a value for every target to be ranked: a method that seldom has would take

@@ -20,15 +20,15 @@ def table(results: Results) -> str:
 def test_a_display_without_a_difference_has_two_that_lead() -> None:
     means = {"old@a": 17.0, "new@a": 19.0, "old@b": 17.0, "new@b": 17.0}
     first, second = answer(results_of(means, noise=lambda label: NOISE if label == "old" else -NOISE))
-    assert first == "a: new leads (18.95 dB), +1.90 dB [+1.49, +2.31] against old."
-    assert second == "b: old and new lead, not told apart (17.05 dB)."
+    assert first == "a: Best: new, 18.95 dB, +1.90 dB [+1.49, +2.31] against old."
+    assert second == "b: Best: old and new, not told apart, 17.05 dB."
 
 
 def test_a_network_that_was_trained_without_photographs_stands_among_those_without_a_camera() -> None:
     networks = frozenset({"net", "trained"})
     means = {"old": 17.0, "net": 18.0, "trained": 16.0}
     results = results_of(means, None, {"trained": 5}, trained=networks, blind=frozenset({"net"}))
-    assert answer(results) == ["net leads (18.05 dB), +1.00 dB [+1.00, +1.00] against old."]
+    assert answer(results) == ["Best: net, 18.05 dB, +1.00 dB [+1.00, +1.00] against old."]
     groups = {row.label: group for display in board(results).displays for group, rows in display.groups for row in rows}
     assert groups == {"net": OPEN_LOOP, "old": OPEN_LOOP, "trained": CALIBRATED}
 
@@ -38,7 +38,7 @@ def test_a_network_that_was_trained_without_photographs_stands_among_those_witho
 )
 def test_who_leads_below_a_baseline_of_another_group_leads_among_the_others(better: str, among: str) -> None:
     (verdict,) = answer(results_of({"old": 20.0, "plain": 16.0}, **{better: frozenset({"old"})}))
-    assert verdict.startswith(f"without {among} plain leads (16.05 dB), -4.00 dB")
+    assert verdict.startswith(f"Best without {among}: plain, 16.05 dB, -4.00 dB")
 
 
 def test_each_display_is_held_against_its_own_floor() -> None:
@@ -53,7 +53,7 @@ def test_a_method_that_lacks_a_target_has_no_letter_and_is_named_with_its_remedy
     kept = full.frame[(full.frame["label"] != "new") | (full.frame["target"] != EIGHT[0])].reset_index(drop=True)
     holed = Results(kept, full.facts)
     first, second = answer(holed)
-    assert first == "other leads (18.05 dB), +1.00 dB [+1.00, +1.00] against old."
+    assert first == "Best: other, 18.05 dB, +1.00 dB [+1.00, +1.00] against old."
     assert "new lacks 1 of 8 targets (t0)" in second
     assert "name the other 7 targets with --targets to rank all by these" in second
     assert "|  | new, 7 of 8 targets | 19.06 | – |" in table(holed)
@@ -62,7 +62,7 @@ def test_a_method_that_lacks_a_target_has_no_letter_and_is_named_with_its_remedy
 def test_two_targets_are_not_tested_and_have_no_letters() -> None:
     few = results_of(COMPARED, targets=EIGHT[:2])
     few = Results(few.frame[few.frame["target"].isin(EIGHT[:2])].reset_index(drop=True), few.facts)
-    assert answer(few) == ["other leads (20.15 dB), +3.00 dB against old, untested."]
+    assert answer(few) == ["Best: other, 20.15 dB, +3.00 dB against old, untested."]
     assert "|  | other | 20.15 | +3.00 (no test) |" in table(few)
 
 
@@ -91,4 +91,4 @@ def test_a_prediction_that_lacks_a_target_is_not_ranked() -> None:
     lost = results.frame["label"].eq("new") & results.frame["target"].eq(EIGHT[0])
     results.frame.loc[lost, ["state", "psnr_linear"]] = "failed", np.nan
     assert story_of(results) is prediction
-    assert answer(results) == ["old predicts best (20.05 dB)."]
+    assert answer(results) == ["Best: old, 20.05 dB."]

@@ -66,5 +66,5 @@ def test_scores_in_focus_are_named_so_and_lead_the_tables_which_other_studies_la
 
 def test_one_hologram_of_all_planes_is_compared_with_one_a_plane() -> None:
     results = results_of({"lens": 20.0, "joint": 18.0})
-    assert answer(results) == ["bench, against lens: joint (of all planes) -3.33 dB [-4.10, -2.56]."]
-    assert answer(results_of({"joint": 18.0}, baseline=None)) == ["bench: joint 16.87 dB."]
+    assert answer(results) == ["joint loses to lens, -3.33 dB [-4.10, -2.56]."]
+    assert answer(results_of({"joint": 18.0}, baseline=None)) == ["joint 16.87 dB."]

@@ -166,10 +166,10 @@ def test_oracles_and_methods_that_see_the_camera_are_not_ranked():
 
 
 def test_the_answer_says_who_stays_first_its_tau_and_who_turns():
-    first, tau, turn = "".join(answer(results_of(FLIPPING))).split("; ")
-    assert first == "robust, first on leto-aged, is first on 50 [33, 67] % of its draws"
-    assert tau == "Kendall's tau with its ranking is 0.67 [0.54, 0.79]"
-    assert turn == "steady passes robust most often, on 50 [33, 67] %."
+    first, tau, turn = "".join(answer(results_of(FLIPPING))).split(". ")
+    assert first == "robust, best on leto-aged, is best on 50 [33, 67] % of its draws"
+    assert tau == "Kendall's tau of rankings is 0.67 [0.54, 0.79]"
+    assert turn == "Most often steady passes robust, on 50 [33, 67] %."
 
 
 CONFIG = """
