@@ -16,7 +16,7 @@ from .output import console
 from .run import open_displays, resumable, run
 
 if TYPE_CHECKING:
-    from ..study.calibration.twin import Photographed
+    from ..study.twin import Photographed
 
 NAME = "a-z, A-Z, 0-9, . - and _"
 PANEL_SIZE, PICTURES = (256, 256), 8  # the defaults of a display that is a profile
@@ -45,7 +45,7 @@ def twin(
     """
     from ..core.io import file_name
     from ..report.twin import answer, tried, write_twin
-    from ..study.calibration import twin as twins
+    from ..study import twin as twins
 
     name = output.resolve().name
     if file_name(name) != name:
@@ -75,8 +75,8 @@ def _photographs(
     """The photographs of a session, or those that are taken now."""
     from ..core.io import write_atomically
     from ..lab.session.manifest import FILE as MANIFEST
-    from ..study.calibration import twin as twins
-    from ..study.calibration.twin import PHOTOGRAPHS, WORK
+    from ..study import twin as twins
+    from ..study.twin import PHOTOGRAPHS, WORK
     from ..study.network_display import predictor
 
     name = output.resolve().name
@@ -120,7 +120,7 @@ def _photographs(
 def _show_on_twin(output: Path, artifacts: Path) -> None:
     """Capture the holograms on the twin and those it has to be better than. The report of the twin has what counts."""
     from ..core.device import find
-    from ..study.calibration.twin import TRIAL, WORK
+    from ..study.twin import TRIAL, WORK
     from ..study.config import load_study
     from ..study.executors import Serial
     from ..study.plan import plan

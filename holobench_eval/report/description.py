@@ -8,14 +8,12 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from ..core.errors import UserError
 from ..core.installed import as_typed
 from ..display.api import DisplaySpec
+from ..display.simulated.origins import families, fit_of
 from ..display.simulated.profile import Profile, load_profile, names
 from ..display.simulated.stages import Panel
 from ..study import isolation
-from ..study.calibration import load_calibration
-from ..study.calibration.family import names as families
 from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
@@ -127,16 +125,14 @@ def basis(profile: Profile) -> str:
         return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:
         return f"{measured}; drawn from ranges, and kept since its captures come near published figures"
-    try:
-        calibration = load_calibration(profile)
-    except UserError:
+    if (fit := fit_of(profile)) is None:
         return measured
-    figures = [f"{name} {psnr:g} dB" for name, psnr in calibration.figures.items()]
-    if calibration.prediction:
-        figures.append(f"predictions by a U-Net {calibration.prediction.psnr:g} dB")
-    free = words([name.replace(".", " ").replace("_", " ") for name in calibration.free])
+    figures = [f"{name} {psnr:g} dB" for name, psnr in fit["figures"].items()]
+    if "prediction" in fit:
+        figures.append(f"predictions by a U-Net {fit['prediction']['psnr']:g} dB")
+    free = words([name.replace(".", " ").replace("_", " ") for name in fit["free"]])
     return (
-        f"{measured}; {free} were fitted to published PSNR ({', '.join(figures)}), on {calibration.targets.dataset}, "
+        f"{measured}; {free} were fitted to published PSNR ({', '.join(figures)}), on {fit['targets']['dataset']}, "
         "so that agreement with these figures is no evidence"
     )
 

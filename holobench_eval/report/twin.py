@@ -19,7 +19,7 @@ from ..core.io import write_atomically
 from ..display.estimates import QUANTITIES
 from ..display.simulated.trust import MOST, Trust
 from ..metrics import match
-from ..study.calibration.twin import Photographed, trial_names
+from ..study.twin import Photographed, trial_names
 from ..study.plan import Cell
 from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores

@@ -14,7 +14,7 @@ from holobench_eval.methods.calibrated import patterns
 from holobench_eval.methods.twin import method
 from holobench_eval.methods.wirtinger import Wirtinger
 from holobench_eval.report.description import basis
-from holobench_eval.study.calibration import twin as twins
+from holobench_eval.study import twin as twins
 from tests.study.studies import write_green
 from tests.support.small_training import QUICK, SHORT_OPEN_LOOP
 

@@ -13,31 +13,31 @@ import torch
 import yaml
 from torch import Tensor
 
-from ...core.errors import CellError, UserError
-from ...core.installed import shipped_configs
-from ...core.io import file_name, write_atomically
-from ...core.yaml_source import load
-from ...display import Profile, load_profile
-from ...display.simulated.maps import load_maps
-from ...display.simulated.profile import STAGES
-from ...display.simulated.stages import Sensor
-from ...lab.bench_file import load_bench_file
-from ...lab.session import read_manifest
-from ...methods.files.arrays import read_array
-from ...methods.twin.method import learned_twin
-from ...methods.twin.to_profile import to_profile, write_profile
-from ...metrics import match
-from ..artifacts import Artifact, Artifacts
-from ..config import load_study
-from ..definition import MethodEntry, Study
-from ..displays import Condition, displays
-from ..folders.session import ARTIFACTS, REPORT, study_of
-from ..isolation import traits
-from ..network_display import predictor, write_network
-from ..opening import open_bench
-from ..plan import Cell, Plan, plan
-from ..scoring.scores import kept_capture
-from ..store import Store
+from ..core.errors import CellError, UserError
+from ..core.installed import shipped_configs
+from ..core.io import file_name, write_atomically
+from ..core.yaml_source import load
+from ..display import Profile, load_profile
+from ..display.simulated.maps import load_maps
+from ..display.simulated.profile import STAGES
+from ..display.simulated.stages import Sensor
+from ..lab.bench_file import load_bench_file
+from ..lab.session import read_manifest
+from ..methods.files.arrays import read_array
+from ..methods.twin.method import learned_twin
+from ..methods.twin.to_profile import to_profile, write_profile
+from ..metrics import match
+from .artifacts import Artifact, Artifacts
+from .config import load_study
+from .definition import MethodEntry, Study
+from .displays import Condition, displays
+from .folders.session import ARTIFACTS, REPORT, study_of
+from .isolation import traits
+from .network_display import predictor, write_network
+from .opening import open_bench
+from .plan import Cell, Plan, plan
+from .scoring.scores import kept_capture
+from .store import Store
 
 WORK = "work"  # in the folder of a twin: two studies, a config and a report each, and the displays of the trial
 PHOTOGRAPHS, TRIAL = "photographs", "trial"
