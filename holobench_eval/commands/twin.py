@@ -76,8 +76,8 @@ def _photographs(
     from ..core.io import write_atomically
     from ..lab.session.manifest import FILE as MANIFEST
     from ..study import twin as twins
-    from ..study.twin import PHOTOGRAPHS, WORK
     from ..study.network_display import predictor
+    from ..study.twin import PHOTOGRAPHS, WORK
 
     name = output.resolve().name
     if Path(display).is_dir():
@@ -120,12 +120,12 @@ def _photographs(
 def _show_on_twin(output: Path, artifacts: Path) -> None:
     """Capture the holograms on the twin and those it has to be better than. The report of the twin has what counts."""
     from ..core.device import find
-    from ..study.twin import TRIAL, WORK
     from ..study.config import load_study
     from ..study.executors import Serial
     from ..study.plan import plan
     from ..study.running.progress import watching
     from ..study.running.run import run as compute
+    from ..study.twin import TRIAL, WORK
 
     work = output / WORK
     study = load_study(work / f"{TRIAL}.yaml")
