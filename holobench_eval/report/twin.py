@@ -7,7 +7,7 @@ out of place.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,12 +20,14 @@ from scipy.optimize import nnls
 from scipy.stats import kendalltau
 from torch import Tensor
 
+from ..core.device import CPU
 from ..core.io import write_atomically
+from ..display import Profile
 from ..display.estimates import QUANTITIES
 from ..display.simulated.trust import MOST, Trust
-from ..metrics import match
+from ..metrics import match, score
 from ..study.artifacts import TrainingRecord
-from ..study.twin import Photographed, trial_names
+from ..study.twin import SCORE, Photographed, captured, opened
 from .charts.look.methods import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
@@ -95,7 +97,8 @@ class Trial:
     label: of the method whose holograms were made through it; frame: a row a picture, columns ``(value, display,
     method)``; the value ``score`` is of the display and of each of the trial, the twin first; ``likeness`` is that of a
     capture there to a photograph, ``further`` how much higher that of a second photograph is, and then by colour [dB].
-    off: light and place of ``misfit``, none of a network, which has no noise; is_simulated: whether the display is.
+    first: captures of the twin of the first picture, by method; off: light and place of ``misfit``, none of a network,
+    which has no noise; is_simulated: whether the display is.
     """
 
     name: str
@@ -103,6 +106,7 @@ class Trial:
     label: str
     photographs: int
     frame: pd.DataFrame
+    first: Mapping[str, Tensor]
     off: tuple[Array, ...] = ()
     is_simulated: bool = True
 
@@ -151,30 +155,37 @@ class Trial:
         return Trust(self.of, self.photographs, len(self.frame), gaps, *off, round(flattery.mean, 2), error)
 
 
-def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
-    """Compare the photographs of a display with the captures of its twin. UserError: a cell of either is missing.
+def tried(photographed: Photographed, displays: Sequence[Profile], device: torch.device = CPU) -> Trial:
+    """Show the holograms of a display on those of a trial, the twin first, and compare. UserError: a photograph is
+    missing, or a display cannot be registered.
 
-    Of a method whose repeats have random starts the first is shown on the twin.
+    Of a method whose repeats have random starts the first is shown.
     """
-    of, cells, twice = photographed.display, trial.cells(), photographed.twice
-    shots, values = list[dict[str, Array]](), dict[str, dict[tuple[str, str, str], float]]()
-    items = dict.fromkeys(item for _, item in twice)
+    of, twice, own = photographed.display, photographed.twice, photographed.row.label
+    items = dict.fromkeys(item for _, item in photographed.own)
     noise = {item: noise_of([photographed.pair(*key) for key in twice if key[1] == item]) for item in items}
-    for (label, item), own in photographed.own.items():
-        same = [photographed.captures(cell) for cell in own[: None if (label, item) in twice else 1]]
-        scores = {("score", of.name, label): float(np.mean([score for _, score in same]))}
-        for twin in trial_names(name, photographed):
-            capture, score = trial.captures(cells[twin][label, item][0])
-            shot = compared(same[0][0], capture, photographed.target(item), noise[item])
+    values: dict[str, dict[tuple[str, str, str], float]] = {item: {} for item in items}
+    shots, first = list[dict[str, Array]](), dict[str, Tensor]()
+    for (label, item), cells in photographed.own.items():
+        scores = [photographed.captures(cell)[1] for cell in cells[: None if (label, item) in twice else 1]]
+        values[item]["score", of.name, label] = float(np.mean(scores))
+    for profile in displays:
+        bench = opened(photographed, profile, device)
+        for (label, item), cells in photographed.own.items():
+            target, photograph = photographed.target(item), photographed.captures(cells[0])[0]
+            capture = captured(photographed, bench, label, item)
+            shot = compared(photograph, capture, target, noise[item])
             likeness, gaps = further(shot)
-            shots += [shot] * (twin == name)
+            if profile is displays[0]:
+                shots.append(shot)
+                first.setdefault(label, capture)
             keys = ("score", "likeness", "further", *COLOURS * (len(gaps) > len(COLOURS)))
-            scores |= {(key, twin, label): each for key, each in zip(keys, (score, likeness[0], *gaps), strict=False)}
-        values.setdefault(item, {}).update(scores)
-    frame = pd.DataFrame.from_dict(values, orient="index").rename_axis(columns=["value", "display", "method"])
+            shown = score(capture, target, metrics=("psnr",))[SCORE], likeness[0], *gaps
+            values[item] |= {(key, profile.name, label): each for key, each in zip(keys, shown, strict=False)}
+    frame = pd.DataFrame.from_dict(values, orient="index")
     off = misfit(shots) if photographed.row.name == "twin" else ()
     learned, is_simulated = photographed.learned.provenance["captures"], of.real is None
-    return Trial(name, of.name, photographed.row.label, learned, frame, off, is_simulated)
+    return Trial(displays[0].name, of.name, own, learned, frame, first, off, is_simulated)
 
 
 def answer(found: Trial) -> Iterator[str]:
@@ -208,14 +219,14 @@ def _signed(estimate: Estimate) -> str:
     return f"{estimate.mean:+.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
-def write_twin(folder: Path, photographed: Photographed, trial: Photographed, found: Trial, profile: Path) -> Path:
+def write_twin(folder: Path, photographed: Photographed, found: Trial, profile: Path) -> Path:
     """Write ``report.md`` and its pictures; returns the path of the former."""
-    _draw(folder, photographed, trial, found)
+    _draw(folder, photographed, found)
     known = Training("", (), found.of, TrainingRecord(photographed.learned.provenance, ()))
     has_equations, learned = len(found.twins) > 1, list(estimates(known))
     means, methods = found.means, []
-    for label, score in means["score", found.of].sort_values(ascending=False).items():
-        line = {"method": f"{label}{' (flattery)' * (label == found.label)}", "display [dB]": f"{score:.2f}"}
+    for label, mean in means["score", found.of].sort_values(ascending=False).items():
+        line = {"method": f"{label}{' (flattery)' * (label == found.label)}", "display [dB]": f"{mean:.2f}"}
         line |= {"twin [dB]": f"{means['score', found.name][label]:.2f}"}
         line |= {"twin less display [dB]": _signed(found.difference(label))}
         line |= {"against a photograph [dB]": f"{means['likeness', found.name][label]:.1f}"}
@@ -287,16 +298,16 @@ def write_twin(folder: Path, photographed: Photographed, trial: Photographed, fo
     return path
 
 
-def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: Trial) -> None:
-    item, on_twin = found.frame.index[0], trial.cells()[found.name]
-    target, rows = photographed.target(item), {}
+def _draw(folder: Path, photographed: Photographed, found: Trial) -> None:
+    item, rows = found.frame.index[0], {}
+    target = photographed.target(item)
     for label in dict.fromkeys([photographed.study.baseline, found.label]):
         if (label, item) in photographed.twice:
             first, second = photographed.pair(label, item)
-            twin, first = trial.captures(on_twin[label, item][0])[0], match(first, target)[0]
-            rows[label] = first, match(second, first)[0], match(twin, first)[0]
+            first = match(first, target)[0]
+            rows[label] = first, match(second, first)[0], match(found.first[label], first)[0]
     draw_twin_pictures(folder / PICTURES, f"{found.of} and {found.name}", (item, target), rows)
     names = {entry.label: entry.name for entry in photographed.study.methods}
-    score = found.frame["score"]
-    display, twin, *others = ({key: score[name, key] for key in score[name]} for name in (found.of, *found.twins))
+    scores = found.frame["score"]
+    display, twin, *others = ({key: scores[name, key] for key in scores[name]} for name in (found.of, *found.twins))
     draw_twin_scores(folder / SCORES, display, twin, looks(names), others)

@@ -87,7 +87,7 @@ def trial() -> Trial:
         shown = {key: own + (more if key == label else 0.5) for key, own in scores.items()}
         values |= {("score", twin, key): own for key, own in shown.items()}
         values |= {("further", twin, key): np.full(3, 1.0 + (key == "own")) for key in scores}
-    return Trial("lab", "bench", "own", 59, pd.DataFrame(values), (np.full(3, 0.1), np.full(3, 0.05)))
+    return Trial("lab", "bench", "own", 59, pd.DataFrame(values), {}, (np.full(3, 0.1), np.full(3, 0.05)))
 
 
 def test_flattery_is_what_its_own_holograms_score_more_on_the_twin() -> None:
