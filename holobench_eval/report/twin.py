@@ -149,10 +149,11 @@ class Trial:
 
     def trust(self) -> Trust:
         """What stands in the profile."""
-        flattery, gaps = self.difference(self.label), self.means["further", self.name].round(2).to_dict()
-        off = [tuple(round(float(each), 4) for each in own) for own in self.off or ((), ())]
-        error = round((flattery.high - flattery.low) / 2, 2)
-        return Trust(self.of, self.photographs, len(self.frame), gaps, *off, round(flattery.mean, 2), error)
+        flattery, gaps = self.difference(self.label), self.means["further", self.name]
+        known = {str(label): round(float(gap), 2) for label, gap in gaps.items()}
+        light, place = (tuple(round(float(each), 4) for each in own) for own in self.off or ((), ()))
+        mean, error = (round(value, 2) for value in (flattery.mean, (flattery.high - flattery.low) / 2))
+        return Trust(self.of, self.photographs, len(self.frame), known, light, place, mean, error)
 
 
 def tried(photographed: Photographed, displays: Sequence[Profile], device: torch.device = CPU) -> Trial:
@@ -224,14 +225,19 @@ def write_twin(folder: Path, photographed: Photographed, found: Trial, profile: 
     _draw(folder, photographed, found)
     known = Training("", (), found.of, TrainingRecord(photographed.learned.provenance, ()))
     has_equations, learned = len(found.twins) > 1, list(estimates(known))
-    means, methods = found.means, []
-    for label, mean in means["score", found.of].sort_values(ascending=False).items():
-        line = {"method": f"{label}{' (flattery)' * (label == found.label)}", "display [dB]": f"{mean:.2f}"}
-        line |= {"twin [dB]": f"{means['score', found.name][label]:.2f}"}
-        line |= {"twin less display [dB]": _signed(found.difference(label))}
-        line |= {"against a photograph [dB]": f"{means['likeness', found.name][label]:.1f}"}
-        gaps = {"further [dB]": "further"} | {colour: colour for colour in COLOURS if colour in means}
-        methods.append(line | {name: f"{means[key, found.name][label]:.2f}" for name, key in gaps.items()})
+    means, of, twin = found.means.sort_values(("score", found.of), ascending=False), found.of, found.name
+    methods = [
+        {
+            "method": f"{label}{' (flattery)' * (label == found.label)}",
+            "display [dB]": f"{own['score', of]:.2f}",
+            "twin [dB]": f"{own['score', twin]:.2f}",
+            "twin less display [dB]": _signed(found.difference(label)),
+            "against a photograph [dB]": f"{own['likeness', twin]:.1f}",
+            "further [dB]": f"{own['further', twin]:.2f}",
+            **{colour: f"{own[colour, twin]:.2f}" for colour in COLOURS if (colour, twin) in own},
+        }
+        for label, own in zip(map(str, means.index), means.to_dict("records"), strict=True)
+    ]
     pairs = [
         {
             "methods": " less ".join(row["methods"]),
