@@ -36,7 +36,6 @@ COMMANDS = {
     "Your own methods, displays and devices, and this program": (
         "own.new",
         "own.conformance",
-        "own.calibrate",
     ),
 }
 

@@ -59,7 +59,8 @@ def test_a_difference_below_the_margin_is_no_gain() -> None:
     small = MARGINS["dB"][0] / 2
     results = results_of({"old": 17.0, "new": 17.0 + small}, question="Is new better than old?")
     test = results.tested("new", "bench")
-    assert test is not None and test.is_shown
+    assert test is not None
+    assert test.is_shown
     assert effect(results.headline, test) == ALIKE
     assert answer(results)[0].startswith("No. new is as good as old, +0.05 dB.")
 
