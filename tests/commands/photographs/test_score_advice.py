@@ -1,7 +1,5 @@
 """What ``holoeval score`` and its report say of methods that lack targets, and of how to rank them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -31,8 +29,8 @@ def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
 def holed(*holes: tuple[str, str, str, str]) -> Results:
     """Methods a to c with scores of four targets, but for holes: state, method, target, reason."""
     targets = ("t0", "t1", "t2", "t3")
-    given = facts(pairs=tuple((m, "d") for m in "abc"), targets=targets, privileged=frozenset(), reported={})
-    given = replace(given, baseline=None, measure=FILES, values="linear")
+    pairs, alone = tuple((m, "d") for m in "abc"), {"privileged": (), "reported": {}, "baseline": None}
+    given = facts(pairs=pairs, targets=targets, measure=FILES, values="linear", **alone)
     lost = {(method, target): {"state": state, "reason": reason} for state, method, target, reason in holes}
     records = [
         one | lost.get((method, target), {}) | ({"scores": {}} if (method, target) in lost else {})
