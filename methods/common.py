@@ -119,13 +119,11 @@ def with_offset(phase: Tensor, policy: Offset) -> Tensor:
 def _least_populated(panel: Tensor) -> Tensor:
     """The phase value [rad] near which the fewest pixels of a panel lie, by a histogram smoothed over 2 pi."""
     panel = panel.cpu()  # no deterministic histogram on a GPU
-    counts = torch.histc(wrap(panel).double(), bins=_HISTOGRAM_BINS, min=0.0, max=TAU).long()
-    bins = torch.arange(_HISTOGRAM_BINS)
-    cosine = (1 + torch.cos(bins.double() * (TAU / _HISTOGRAM_BINS))) / 2
-    apart = (bins[:, None] - bins) % _HISTOGRAM_BINS
+    counts = torch.histc(wrap(panel).double(), bins=_HISTOGRAM_BINS, min=0.0, max=TAU)
     # A raised cosine of period 2 pi, to the 8th power: a window of 1.2 rad full width at half maximum,
-    # so a broad valley wins over a narrow empty bin. In whole numbers, so that rounding decides no tie:
-    # of equally empty bins that one wins which is farthest from all pixels.
-    near, far = ((window * 2**36).round().long()[apart].mul(counts).sum(1) for window in (cosine**8, cosine))
-    least = torch.where(near == near.min(), far, far.max() + 1).argmin()
+    # so a broad valley wins over a narrow empty bin.
+    angles = torch.arange(_HISTOGRAM_BINS, dtype=torch.float64) * (TAU / _HISTOGRAM_BINS)
+    window = ((1 + torch.cos(angles)) / 2) ** 8
+    smooth = torch.fft.irfft(torch.fft.rfft(counts) * torch.fft.rfft(window), n=_HISTOGRAM_BINS)
+    least: Tensor = smooth.argmin()
     return (least + 0.5) * (TAU / _HISTOGRAM_BINS)

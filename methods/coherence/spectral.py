@@ -61,7 +61,6 @@ class PartiallyCoherent(ByColour):
     initial_phase: InitialPhase = "constant"
 
     title: ClassVar[str] = "descent through the spectrum, Peng 2021"
-    version: ClassVar[int] = 2
 
     def retrieve(self, target: Tensor, bench: Bench, channel: int) -> Tensor:
         """The phase of the least squared error of intensity that was seen."""
