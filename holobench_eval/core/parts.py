@@ -16,7 +16,7 @@ from .yaml_source import Document, Keys, Position, dump, load
 PARTS = "parts"  # the key of a config
 NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 # What else lies in the folder of a report.
-TAKEN = {"captures", "figures", "journal", "phases", "pictures", "posterior", "records", "solved", "training"}
+TAKEN = {"captures", "figures", "journal", "phases", "pictures", "draws", "records", "solved", "training"}
 
 
 def divided(config: Path) -> tuple[Path, str]:
