@@ -36,7 +36,6 @@ COMMANDS = {
     "Your own methods, displays and devices, and this program": (
         "own.new",
         "own.conformance",
-        "own.calibrate",
     ),
 }
 
@@ -130,7 +129,7 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="plain")
     try:
-        app()
+        app(prog_name="holoeval")  # however Python was started
     except (UserError, OSError) as error:
         print(f"holoeval: {one_line(_told(error))}", file=sys.stderr)
         sys.exit(2)

@@ -69,18 +69,21 @@ def _unknown(name: str) -> str:
 
 
 def studies() -> Entries:
-    """Every study that ships, with its title."""
-    for name, file in shipped_configs().items():
-        yield name, _words(file)["title"]
+    """Every study that ships and every part of one, with its title."""
+    for name in shipped_configs():
+        keys = _keys(name)
+        yield name, keys["title"]
+        yield from ((f"{name}/{part}", own.get("title", keys["title"])) for part, own in keys.get("parts", {}).items())
 
 
 @cache
-def _words(file: Path) -> dict[str, str]:
-    """What a config says in words."""
+def _keys(name: str) -> dict[str, Any]:
+    """The keys of a config that ships, or of a part of one."""
     import yaml
 
-    content = yaml.load(file.read_bytes(), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    return {key: " ".join(content[key].split()) for key in ("title", "question", "would_change") if key in content}
+    file, _, part = name.partition("/")
+    keys = yaml.load(shipped_configs()[file].read_bytes(), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    return {**keys, **keys["parts"][part]} if part else keys
 
 
 def plug_ins(kind: plugins.Kind, **marks: str) -> Entries:
@@ -168,11 +171,15 @@ def _values_of(kind: Change) -> str:
 
 def explain_study(screen: Console, name: str) -> None:
     """Print what a study asks, and where its config is."""
-    file = shipped_configs()[name]
+    keys, (file, _, part) = _keys(name), name.partition("/")
     _heading(screen, "studies", name, [])
-    for key, text in {**_words(file), "config": str(file), "run": f"holoeval run {name}"}.items():
+    words: dict[str, str] = {key: keys[key] for key in ("title", "question", "would_change") if key in keys}
+    if not part and "parts" in keys:
+        words["parts"] = ", ".join(keys["parts"])
+    words |= {"config": str(shipped_configs()[file] / part), "run": f"holoeval run {name}"}
+    for key, text in words.items():
         said = key.replace("would_change", "would change the answer")
-        screen.print(escape(f"{said}: {text}"), soft_wrap=key == "config")
+        screen.print(escape(f"{said}: {' '.join(text.split())}"), soft_wrap=key == "config")
 
 
 def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,19 +19,27 @@ if TYPE_CHECKING:
 
 
 def config_path(text: str) -> Path:
-    """The config of a study, given by its path or by the name of one that ships. UserError for a name of none."""
-    path = Path(text)
-    shipped = shipped_configs()
-    if path.is_file() or path.suffix or len(path.parts) > 1:
+    """The config of a study, given by its path or by the name of one that ships; a part of it is named behind either.
+
+    UserError for a name of none.
+    """
+    path, shipped = Path(text), shipped_configs()
+    name, *part = path.parts or ("",)
+    if path.is_file() or any(Path(each).suffix for each in path.parts):
         return path
-    if text not in shipped:
-        raise UserError(f"no study of the name '{text}' ships, and no such file is here; {suggest(text, shipped)}")
-    return shipped[text]
+    if name not in shipped:
+        fault = f"no study of the name '{name}' ships, and no such file is here; {suggest(name, shipped)}"
+        raise UserError(f"{fault}; a part follows a name or a file, file.yaml/part" if part else fault)
+    return shipped[name].joinpath(*part)
 
 
 Config = Annotated[
     Path,
-    typer.Argument(metavar="CONFIG", parser=config_path, help="A study: its file, or the name of one that ships."),
+    typer.Argument(
+        metavar="CONFIG",
+        parser=config_path,
+        help="A study: its file, or the name of one that ships; NAME/PART is a part of it.",
+    ),
 ]
 Output = Annotated[
     Path | None,
@@ -80,15 +89,26 @@ def output_folder(study: Study, output: Path | None) -> Path:
     return folder
 
 
-def planned(config: Path, output: Path | None) -> tuple[Study, Path, Plan]:
-    """A study as it was run into its folder, that folder, and the plan."""
-    from ..study.changes import recorded
+def studies(config: Path, output: Path | None, changes: Changes) -> list[tuple[Study, Path]]:
+    """A study and its folder, and its parts behind it; a changed study alone."""
     from ..study.config import load_study
+
+    first = load_study(config, changes)
+    folder = output_folder(first, output)
+    parts = [load_study(first.file / name) for name in ({} if changes else first.parts)]
+    return [(first, folder), *((part, folder / part.part) for part in parts)]
+
+
+def planned(config: Path, output: Path | None) -> Iterator[tuple[Study, Path, Plan]]:
+    """A study as it was run into its folder, that folder, and the plan; then its parts that were run."""
+    from ..study.changes import recorded
     from ..study.plan import plan
     from ..study.running import provenance
 
-    study = load_study(config, recorded(provenance.read(output)) if output else None)
-    return study, output_folder(study, output), plan(study)
+    changes = recorded(provenance.read(output)) if output else changes_of(None, None, None, None)
+    for study, folder in studies(config, output, changes):
+        if study.config == config or (folder / provenance.FILE).is_file():
+            yield study, folder, plan(study)
 
 
 def thread_count(threads: int | None, workers: int, study: Study) -> int:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..study.store import Store
 
 FLOOR = "floor"  # the label of the row of floor cells
+STATES = ("done", "failed", "missing")  # of cells
 LOOK: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": 0, "show_edge": False}  # of tables
 
 
@@ -42,16 +43,22 @@ def plan(
     artifacts: options.Learned = options.ARTIFACTS,
 ) -> None:
     """Show what a study would compute, and what of it is done; compute nothing."""
+    studies = options.studies(config, output, options.changes_of(methods, targets, limit, values))
+    rows = [row for study, folder in studies for row in _show(study, folder, threads, device, artifacts)]
+    if len(studies) > 1:
+        sums = ", ".join(f"{sum(getattr(row, name) for row in rows)} {name}" for name in STATES)
+        print(f"{len(studies)} studies: {sums} of {sum(row.cells for row in rows)} cells")
+
+
+def _show(study: Study, folder: Path, threads: int | None, device: str, artifacts: Path) -> list[Row]:
+    """Print the plan of a study, and return its rows."""
     from ..core.device import find, gpu_name, gpus
     from ..study.artifacts import Artifacts
-    from ..study.config import load_study
     from ..study.executors import executor
     from ..study.plan import plan as plan_cells
     from ..study.store import Store
 
     console = open_console()
-    study = load_study(config, options.changes_of(methods, targets, limit, values))
-    folder = options.output_folder(study, output)
     workers = executor("auto", None, is_small(study.display.panel), gpus=gpus(device)).workers
     grid, many = plan_cells(study), options.thread_count(threads, workers, study)
     artifacts = options.learned_folder(artifacts, grid)
@@ -76,6 +83,7 @@ def plan(
                 "FOLDER it need not be trained.",
             )
     console.print(f"output folder: {folder}", soft_wrap=True)
+    return rows
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,7 @@ def table(study: Study, rows: list[Row]) -> Table:
     result = Table(title=escape(study.title), title_justify="left", show_footer=True, **LOOK)
     floors = sum(row.cells for row in rows if row.label == FLOOR)
     result.add_column("method", footer=f"all, {floors} of them floors" if floors else "all", overflow="fold")
-    numbers = ("conditions", "targets", "cells", "done", "failed", "missing")
+    numbers = ("conditions", "targets", "cells", *STATES)
     for name in numbers:
         total = str(sum(getattr(row, name) for row in rows)) if name in numbers[2:] else ""
         result.add_column("displays" if name == "conditions" else name, justify="right", footer=total)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import UserError, suggest
+from ..core.installed import as_typed
 from ..core.panels import is_small
 from .options import ARTIFACTS, Config, Output, Threads, planned, thread_count
 from .output import console as open_console
@@ -23,21 +24,20 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     from ..study.store import Store
 
     console = open_console()
-    study, folder, grid = planned(config, output)
-    if not Store(folder).folder.is_dir():
-        raise UserError(f"{folder} has no captures; holoeval run {config} takes them")
+    grids = [*planned(config, output)]
     for name in metric or ():
-        if name not in grid.metrics:
-            raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grid.metrics)}")
-    where = (
-        executors.Serial() if study.display.real else executors.executor("auto", None, is_small(study.display.panel))
-    )
-    many = thread_count(threads, where.workers, study)
-    with watching(console) as watch:
-        outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=tuple(metric or grid.metrics))
-    how = (
-        "without its record holoeval run photographs each again" if study.display.real else "holoeval run computes them"
-    )
-    left = f"; {outcome.unscored} have no whole capture of their own kept, and {how}" * bool(outcome.unscored)
-    console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}")
-    write_report(console, study, outcome.records, folder, outcome.provenance)
+        if name not in grids[0][2].metrics:
+            raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grids[0][2].metrics)}")
+    for study, folder, grid in reversed(grids):  # the first study's report has the answers of its parts
+        if not Store(folder).folder.is_dir():
+            raise UserError(f"{folder} has no captures; holoeval run {as_typed(study.config)} takes them")
+        real, panel = study.display.real, study.display.panel
+        where = executors.Serial() if real else executors.executor("auto", None, is_small(panel))
+        many = thread_count(threads, where.workers, study)
+        wanted = tuple(name for name in metric or grid.metrics if name in grid.metrics)
+        with watching(console) as watch:
+            outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=wanted)
+        how = "without its record holoeval run photographs each again" if real else "holoeval run computes them"
+        left = f"; {outcome.unscored} have no whole capture of their own kept, and {how}" * bool(outcome.unscored)
+        console.print(f"{outcome.rescored} captures scored again, {outcome.solved} solved{left}")
+        write_report(console, study, outcome.records, folder, outcome.provenance)

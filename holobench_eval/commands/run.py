@@ -19,11 +19,12 @@ from threading import Thread
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import yaml
 
 from ..core.errors import UserError, one_line
+from ..core.installed import as_typed
 from ..core.io import read_regular
 from ..core.panels import is_small
+from ..core.parts import divided, load_config
 from ..core.yaml_source import LARGEST_BYTES
 from . import options
 from .output import console as open_console
@@ -58,7 +59,9 @@ def run(
 ) -> None:
     """Compute what is missing of a study and write its report. A stopped run goes on with the same command.
 
-    With --methods, --targets, --limit or --set, a part or a variant of the study is run, and its report says so.
+    A part of the study is run by its name behind that of the study, such as table3/table2, into a folder in that of the
+    study. With --methods, --targets, --limit or --set, some of the study or a variant of it is run, and its report says
+    so.
     """
     changes = options.changes_of(methods, targets, limit, values)
     with resumable():
@@ -73,45 +76,51 @@ def run(
         from ..study.running.run import run as compute
         from ..study.training import keep_training_records
 
-        console, study = open_console(), load_study(config, changes)
-        device, where = _where(study, device, executor, workers, address)
+        console = open_console()
+        study = load_study(config, changes)
+        named, where = _where(study, device, executor, workers, address)
         open_displays(study)
         folder, grid = options.output_folder(study, output), plan(study)
-        artifacts = options.learned_folder(artifacts, grid)
+        learned = options.learned_folder(artifacts, grid)
         if word := replaced(study, folder):
             console.print(word, markup=False, soft_wrap=True)
         many = options.thread_count(threads, where.workers, study)
-        how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": device}
+        how: dict[str, Any] = {"retry_failed": retry_failed, "retrain": retrain, "trains": train, "device": named}
         drawings = sheets(study, folder)
         beside = drawings if where.workers > 1 else []
         if where.workers > 1:  # meanwhile this process only waits
             Thread(target=import_module, args=("holobench_eval.report",), daemon=True).start()
         with watching(console) as watch:
-            outcome = compute(study, grid, folder, where, watch, many, artifacts, drawings=beside, **how)
-        keep_training_records(grid, Artifacts(artifacts), folder)
+            outcome = compute(study, grid, folder, where, watch, many, learned, drawings=beside, **how)
+        keep_training_records(grid, Artifacts(learned), folder)
         draw_sheets(drawings, options.thread_count(threads, 1, study))
         write_report(console, study, outcome.records, folder, outcome.provenance)
+        if study.parts and not changes:
+            names = ", ".join(f"{as_typed(config)}/{name}" for name in study.parts)
+            console.print(f"Its parts are studies of their own, run by name: {names}", markup=False, soft_wrap=True)
     if outcome.failed:
         console.print(f"[red]{outcome.failed} cell{'s' * (outcome.failed > 1)} failed[/red]", soft_wrap=True)
-        console.print(f"reasons: {folder}/details.md, tracebacks: {folder}/records/*.log", markup=False, soft_wrap=True)
+        reasons = f"reasons: {folder}/details.md, tracebacks: {folder}/records/*.log"
+        console.print(reasons, markup=False, soft_wrap=True)
         raise typer.Exit(1)
 
 
 def _panel(config: Path) -> tuple[int, int] | None:
     """The panel in a config that nobody has checked yet, without the libraries that check it; None if there is none."""
     try:
-        rows, columns = yaml.safe_load(read_regular(config, LARGEST_BYTES))["display"]["panel"]
+        rows, columns = load_config(config).data["display"]["panel"]
         return int(rows), int(columns)
-    except (UserError, OSError, ValueError, TypeError, LookupError, ArithmeticError, yaml.YAMLError):
+    except (UserError, ValueError, TypeError, LookupError, ArithmeticError):
         return None
 
 
 def _is_finished(config: Path, output: Path | None) -> bool:
     """Whether the last run of a config, as it stands, ended: there is probably nothing to compute."""
     try:
-        known = (output or options.RESULTS / config.stem) / "provenance.json"
+        file, part = divided(config)
+        known = (output or options.RESULTS / file.stem / part) / "provenance.json"
         described = json.loads(read_regular(known, 2 * LARGEST_BYTES))
-        text = hashlib.sha256(read_regular(config, LARGEST_BYTES)).hexdigest()
+        text = hashlib.sha256(load_config(config).text.encode()).hexdigest()
         return bool(described["ended"] and described["config_sha256"] == text)
     except (UserError, OSError, ValueError, TypeError, LookupError):
         return False

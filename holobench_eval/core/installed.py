@@ -50,8 +50,11 @@ def shipped_configs() -> dict[str, Path]:
 
 
 def as_typed(config: Path) -> str:
-    """A config as a command has it: the name of one that ships, else the path."""
-    return config.stem if config == shipped_configs().get(config.stem) else str(config)
+    """A config as a command has it: ``depth`` or ``depth/frames`` of one that ships, else the path."""
+    for name, file in shipped_configs().items():
+        if file in (config, config.parent):
+            return (Path(name) / config.relative_to(file)).as_posix()
+    return str(config)
 
 
 def pinned() -> dict[str, str]:

@@ -64,7 +64,7 @@ class Seen:
         """Note a file that is being opened, or a folder, with ``/`` at its end, that is listed."""
         if not name or name.endswith(COMPILED):
             return
-        if Path(name).parent.name == "__pycache__":
+        if name.endswith(".pyc"):  # in __pycache__, or below PYTHONPYCACHEPREFIX
             with suppress(ValueError):
                 name = importlib.util.source_from_cache(name)
         if flags & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):

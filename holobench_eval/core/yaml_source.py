@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -86,7 +87,7 @@ def load(path: Path) -> Document:
 def _read(path: Path) -> str:
     try:
         return read_regular(path, LARGEST_BYTES).decode("utf-8")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         where = "" if path.is_absolute() else f" in {Path.cwd()}"
         raise UserError(f"{path}: no such file{where}") from None
     except OSError as error:
@@ -145,6 +146,18 @@ for _kind, _pattern, _first in (
     ("float", r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))", list("-+.")),
 ):
     _Loader.add_implicit_resolver(_CORE + _kind, re.compile(f"^{_pattern}$"), _first)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Puts quotes around each text that `parse` would take for something else."""
+
+
+_Dumper.yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+
+
+def dump(data: Mapping[str, Any]) -> str:
+    """A mapping of plain values as YAML, from which `parse` reads the same."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=118)
 
 
 class _Reader:

@@ -106,7 +106,7 @@ def check_radians(phase: Tensor, who: str) -> None:
         raise CellError(f"{who}phase has whole numbers up to {phase.max():g}: levels; expected radians, modulo 2 pi")
 
 
-def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = False) -> str:
+def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = False, computed: bool = False) -> str:
     """What is odd about a phase, told from the nominal model, on which no fault of a display hides it.
 
     A phase that makes its target takes one propagation a colour, any other some dozens: what it may have been meant for
@@ -122,6 +122,9 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = F
         The display's nominal optics.
     seen
         Whether captures of the display may have told how the phase makes up for faults of it.
+    computed
+        Whether a method has computed it for these optics, and not a file given it: that the method is rough is its own
+        matter, and its scores show it.
 
     Returns
     -------
@@ -161,7 +164,7 @@ def phase_doubt(phase: Tensor, target: Tensor, spec: DisplaySpec, seen: bool = F
     if unit_doubt(phase) or (has[COARSE] < UNLIKE and not seen):
         like = "nothing like" if has[COARSE] < UNLIKE else "little of"
         return f"makes {like} its target (values from {low:.2f} to {high:.2f}; correlation {numbers})"
-    if not seen:
+    if not (seen or computed):
         return f"makes its target less well than phases for these optics can (correlation {numbers}): {CAUSES}"
     return ""
 

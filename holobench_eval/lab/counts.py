@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -110,11 +109,3 @@ def step(values: NDArray[Any]) -> int:
     """The largest power of two, up to 256, that divides every unsigned value; 0 where there is no light at all."""
     joined = int(np.bitwise_or.reduce(values, axis=None))
     return min(joined & -joined, 256)
-
-
-def hot_pixels(values: NDArray[Any], white: float) -> NDArray[np.bool_]:
-    """Which samples of a plane ``(H, W)`` are a tenth of white brighter than all their neighbours, as no light is."""
-    ring = np.ones((3, 3), np.uint8)
-    ring[1, 1] = 0
-    light = values.astype(np.float32)
-    return np.asarray(light - cv2.dilate(light, ring) > white / 10)

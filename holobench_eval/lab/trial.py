@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import UserError
+from ..imaging.standing_out import hot_and_dead
 from .bench_file import load_bench_file
-from .counts import hot_pixels
 from .dark import Dark
 from .devices import Camera, DeviceError, Slm
 from .drivers.catalogue import open_device
@@ -73,7 +73,7 @@ def _looked_at(slm: Slm | None, camera: Camera | None, wait: Callable[[float], N
     yield Check(True, f"black: {black:.1f} counts")
     lit = np.mean(frame >= camera.white)
     yield Check(True, f"exposure: {seconds:.3g} s, {lit:.2%} of the samples saturated")
-    yield Check(True, f"hot pixels: {np.count_nonzero(hot_pixels(frame, camera.white))}")
+    yield Check(True, f"hot pixels: {np.count_nonzero(hot_and_dead(frame.astype(np.float32))[0])}")
     yield linearity(partial(averaged, camera, count=1, plane=PLANE), seconds, Dark(np.array(black)))
     if slm is not None:
         toggle = Toggle(

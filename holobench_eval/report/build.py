@@ -14,7 +14,7 @@ from ..core.io import write_atomically
 from ..study.definition import Study
 from .board import texts
 from .charts.look import MEDIA, drawn_for
-from .charts.tiles import draw_wall, spread
+from .charts.tiles import draw_wall
 from .description import Description, describe
 from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks
@@ -56,7 +56,7 @@ def write_report(
     keep_pictures: bool = False,
 ) -> tuple[Path, Results]:
     """``build_report`` for a study that is given by its facts and description."""
-    results = Results(records_frame(records, facts), facts, related(facts, output.parent))
+    results = Results(records_frame(records, facts), facts, related(facts, output))
     report = Report(results, records, output, provenance, description, keep_pictures)
     for name, text in texts(results).items():
         write_atomically(output / name, text.encode())
@@ -90,7 +90,7 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 
 def related(facts: Facts, folder: Path) -> dict[str, Results]:
-    """Results of the related studies that have a report of their name in a folder."""
+    """Results of the parts that predict, where they have a report in the folder of their study."""
     known = {name: folder / name / "records.csv" for name in facts.related}
     return {
         name: Results(of_study(read_records(records_text(path)), facts.related[name]), facts.related[name])
@@ -119,20 +119,17 @@ def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
 
 
 def _draw_slide(report: Report) -> None:
-    """The question, and captures on the first display that has some: of the worst, the middle and the best target of
-    those that have most, by the methods of the row of pictures."""
+    """The question, and captures of the targets whose differences are nearest to the mean, on the first display that
+    has any of all methods of the row of pictures."""
     results, thumbnails = report.results, report.thumbnails
     for condition in filter(results.has_pictures, results.conditions):
         labels = sorted(chosen(results, condition), key=lambda label: label != results.baseline)[:SLIDE_METHODS]
-        pictures = thumbnails.targets(condition)
-        tiles = {
-            target: [(label, thumbnails.tile(label, condition, target, 1)) for label in labels]
-            for target in thumbnails.by_quality(condition)
-        }
-        counts = {target: sum(tile.picture is not None for _, tile in row) for target, row in tiles.items()}
-        if most := max(counts.values(), default=0):
-            targets = spread([target for target, count in counts.items() if count == most], SLIDE_TARGETS)
+        targets, pictures = thumbnails.typical(labels, condition)[:SLIDE_TARGETS], thumbnails.targets(condition)
+        if targets:
             below = f"{condition}: {results.headline.axis}{results.text.axis}"
-            rows = {target: (pictures[target], tiles[target]) for target in targets}
+            rows = {
+                target: (pictures[target], [(label, thumbnails.tile(label, condition, target, 1)) for label in labels])
+                for target in targets
+            }
             draw_wall(report.figures / "slide.png", results.study.question or results.study.title, below, rows)
             return

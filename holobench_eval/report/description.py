@@ -8,14 +8,12 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from ..core.errors import UserError
 from ..core.installed import as_typed
 from ..display.api import DisplaySpec
+from ..display.simulated.origins import families, fit_of
 from ..display.simulated.profile import Profile, load_profile, names
 from ..display.simulated.stages import Panel
 from ..study import isolation
-from ..study.calibration import load_calibration
-from ..study.calibration.family import names as families
 from ..study.definition import Study
 from ..study.displays import Condition
 from ..study.displays import displays as conditions
@@ -64,8 +62,8 @@ def describe(study: Study) -> Description:
     else:
         profile = study.display.learned.profile
         displays = tuple(_learned(condition, profile) for condition in conditions(study).values())
-    typed = Path(as_typed(study.file))
-    file = typed.name if typed.is_absolute() else typed.as_posix()
+    typed = Path(as_typed(study.config))
+    file = (Path(study.file.name, study.part) if typed.is_absolute() else typed).as_posix()
     command = "holoeval session import with the session's folder" if study.display.session else ""
     command = f"holoeval run {shlex.quote(file)} {study.changes}" if study.changes else command
     return Description(displays, file, study.text, command, _models(study))
@@ -125,11 +123,9 @@ def basis(profile: Profile) -> str:
         return f"simulated, with maps that the profile gives as measured: {', '.join(profile.held)}"
     if profile.name in {*names(family=True), *families()}:
         return "simulated, chosen for reproducing the published PSNR"
-    try:
-        calibration = load_calibration(profile)
-    except UserError:
+    if (fit := fit_of(profile)) is None:
         return measured
-    free = words([name.replace(".", " ").replace("_", " ") for name in calibration.free])
+    free = words([name.replace(".", " ").replace("_", " ") for name in fit["free"]])
     return f"simulated, with {free} fitted to published PSNR, so that agreement with it is no evidence"
 
 

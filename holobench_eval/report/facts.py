@@ -85,8 +85,8 @@ class Facts:
     and place (plane [mm], or place of the eye's pupil [radii of the iris]). pairs: (label, condition) of each planned
     row; sweeps: which conditions are changes of others; training: what methods may train on (None: nothing is trained);
     network: the display that is a trained network (empty: benches); beside: the condition that published figures stand
-    beside (empty: each); profiles: of simulated displays; related: facts of related studies, by their names; changed:
-    the conditions that are a change of another, with that change.
+    beside (empty: each); profiles: of simulated displays; related: facts of the parts that predict, by their names;
+    changed: the conditions that are a change of another, with that change.
     """
 
     study: Study
@@ -219,7 +219,11 @@ def facts_of(study: Study) -> Facts:
             for source, one in conditions.items()
             if one.real is None and one.learned is None
         },
-        {name: facts_of(load_study(study.folder / f"{name}.yaml")) for name in study.related},
+        {
+            name: facts_of(load_study(study.file / name))
+            for name, keys in study.parts.items()
+            if keys.get("measure") in PREDICTIONS and not study.predicts
+        },
     )
 
 

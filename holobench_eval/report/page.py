@@ -22,7 +22,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
@@ -54,6 +53,7 @@ QUALITY = 75  # of WebP, 0 to 100: two thirds of the bytes of 85, 1 dB further f
 MARK, SAYS = "README.md", b"Small copies of the pictures of the report beside this folder, written with it.\n"
 
 _LINK = re.compile(r"\[([^\]]+)(?<!\\)\]\(([^)#]+)[^)]*\)")  # in Markdown whose names are escaped
+_NO_HEAD = re.compile(r"<thead>\s*<tr>\s*(<th></th>\s*)+</tr>\s*</thead>\s*")  # of a table of names and values
 _JSON = str.maketrans({char: f"\\u{ord(char):04x}" for char in "<>&\u2028\u2029"})
 
 
@@ -174,7 +174,7 @@ def sections(text: str, *tags: str) -> list[tuple[str, Markup]]:
     """The sections of Markdown below headings of these tags, (heading, HTML of what follows), without figures.
 
     Links, which lead out of the page, are a text and a name in brackets. Columns of numbers get a class, since the
-    policy takes no style of an element.
+    policy takes no style of an element. A table has no row of empty headings.
     """
     reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["link", "image", "autolink"])
     tokens = reader.parse(_LINK.sub(r"\1 (\2)", FIGURE.sub("", text)))
@@ -182,10 +182,10 @@ def sections(text: str, *tags: str) -> list[tuple[str, Markup]]:
         if token.attrs.pop("style", None):
             token.attrs["class"] = "number"
     starts = [index for index, token in enumerate(tokens) if token.type == "heading_open" and token.tag in tags]
-    return [
-        (plain(tokens[start + 1].content), Markup(reader.renderer.render(tokens[start + 3 : end], reader.options, {})))
-        for start, end in pairwise([*starts, len(tokens)])
-    ]
+    spans = list(pairwise([*starts, len(tokens)]))
+    texts = (reader.renderer.render(tokens[start + 3 : end], reader.options, {}) for start, end in spans)
+    headings = (plain(tokens[start + 1].content) for start, _ in spans)
+    return [(heading, Markup(_NO_HEAD.sub("", text))) for heading, text in zip(headings, texts, strict=True)]
 
 
 def _charts(report: Report) -> Iterator[Json]:
@@ -260,11 +260,7 @@ def pictures(
     first on the displays, then on each changed display; then target by target all. A target comes with its captures.
     """
     results, kept = report.results, dict[Cell, bytes]()
-    names = [*results.conditions, *results.changed]
-    tables = [pd.DataFrame([results.values(label, name) for label in results.methods(name)]) for name in names]
-    between = pd.concat([values - values.mean() for values in tables])
-    away = between.sub(between.mean(axis=1), axis=0).abs().mean()
-    near = [results.targets[index] for index in away.sort_values(kind="stable").index]
+    names, near = [*results.conditions, *results.changed], results.near
     wanted = [(target, results.conditions) for target in near[:FIRST]]
     wanted += [(target, [name]) for target in near[:FIRST] for name in results.changed]
     for target, these in [*wanted, *((target, names) for target in near)]:

@@ -237,7 +237,7 @@ def committed_records(frame: pd.DataFrame, plan: Plan) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Results:
-    """A records frame with the facts of its study, see ``records_frame``, and results of related studies."""
+    """A records frame with the facts of its study, see ``records_frame``, and those of the parts that predict."""
 
     frame: pd.DataFrame
     facts: Facts
@@ -390,6 +390,16 @@ class Results:
         labels = [label for label in self.methods(condition) if self.category(label) in categories]
         complete = [label for label in labels if self.is_complete(label, condition, key)]
         return sorted(complete, key=lambda label: -score.sign * self.values(label, condition, key).mean())
+
+    @cached_property
+    def near(self) -> list[str]:
+        """The targets, those first whose differences between methods are nearest to the mean ones: what a reader sees
+        of them is what the means say."""
+        names = [*self.conditions, *self.changed]
+        tables = [pd.DataFrame([self.values(label, name) for label in self.methods(name)]) for name in names]
+        between = pd.concat([values - values.mean() for values in tables])
+        away = between.sub(between.mean(axis=1), axis=0).abs().mean()
+        return [self.targets[index] for index in away.sort_values(kind="stable").index]
 
     def estimate(self, values: Array) -> Estimate:
         """Mean of ``(targets,)`` values and its interval over clusters, without the holes."""

@@ -1,213 +1,214 @@
 """The report of a twin: how it compares with its display, and how far it can stand for it.
 
-The same holograms are photographed on one and captured on the other.
+The same holograms are photographed on one and captured on the other. Besides noise, captures are off in their light and
+out of place.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import torch
-from numpy.typing import NDArray
+from scipy.optimize import nnls
 from scipy.stats import kendalltau
+from torch import Tensor
 
+from ..core.device import CPU
 from ..core.io import write_atomically
+from ..display import Profile
 from ..display.estimates import QUANTITIES
 from ..display.simulated.trust import MOST, Trust
-from ..metrics import match
-from ..study.calibration.twin import Photographed, trial_names
-from ..study.plan import Cell
+from ..metrics import match, score
+from ..study.artifacts import TrainingRecord
+from ..study.twin import SCORE, Photographed, captured, opened
 from .charts.look import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
-from .distance import Compared, Misfit, Noise, further
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
-from .statistics import Estimate, mean_interval
-from .stories.training import quantities
+from .statistics import Array, Estimate, mean_interval
+from .stories.training import Training, estimates, quantities
 
 COLOURS = ("red", "green", "blue")
 PICTURES, SCORES = "pictures.jpg", "scores.png"
+DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
+AREA = (-2, -1)
 
 
-@dataclass(frozen=True)
-class Shown:
-    """Holograms of a method on one display: scores ``(pictures,)`` [dB]; and, ``(pictures, 1 + colours)`` with all
-    colours first, PSNR of captures there against a photograph, and how much lower that is than that of a second
-    photograph [dB]."""
+def noise_of(pairs: Sequence[Sequence[Tensor]]) -> Tensor:
+    """Variance of a photograph, ``a + b I + c I^2`` of its light I: read noise, shot noise and flicker; ``(C, 3)``.
 
-    scores: NDArray[np.float64]
-    likeness: NDArray[np.float64]
-    gaps: NDArray[np.float64]
+    pairs: of photographs ``(C, h, w)`` of one hologram each, in equal brightness; by least squares over all pixels.
+    """
+    firsts, seconds = (torch.stack(each).double() for each in zip(*pairs, strict=True))
+    seconds = seconds * ((firsts * seconds).sum(AREA, True) / seconds.square().sum(AREA, True).clamp_min(DARKEST))
+    both = (firsts + seconds) / 2, (firsts - seconds).square() / 2
+    light, squares = (each.transpose(0, 1).flatten(1) for each in both)
+    powers = torch.stack([light**power for power in range(3)], -1)
+    return torch.linalg.lstsq(powers, squares[..., None]).solution[..., 0]
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Score of one method less that of another on the display and on its twin, means over pictures [dB]."""
+def compared(photograph: Tensor, capture: Tensor, target: Tensor, noise: Tensor) -> dict[str, Array]:
+    """A hologram on both, mean squares ``(C,)``: of the difference of capture and photograph, the latter matched to the
+    target and the former to it; of that of two photographs; of the light of the capture; of its slope over a pixel."""
+    factors = match(photograph, target)[1]
+    first = photograph * factors[:, None, None]  # not clipped, as noise is not
+    other = capture * match(capture, first)[1][:, None, None]
+    light = (capture * match(capture, target)[1][:, None, None]).double()
+    powers = torch.stack([photograph.double().pow(power).mean(AREA) for power in range(3)], -1)
+    squares = {
+        "apart": (other - first).double().square().mean(AREA).clamp_min(DARKEST),
+        "noise": (2 * (noise * powers).sum(1).clamp_min(0) * factors.double().square()).clamp_min(DARKEST),
+        "light": light.square().mean(AREA),
+        "slope": light.diff(dim=-2).square().mean(AREA) + light.diff(dim=-1).square().mean(AREA),
+    }
+    return {name: each.numpy() for name, each in squares.items()}
 
-    first: str
-    second: str
-    display: Estimate
-    twin: Estimate
 
-    @property
-    def apart(self) -> float:
-        """How far the twin is off."""
-        return abs(self.twin.mean - self.display.mean)
+def further(shot: dict[str, Array]) -> tuple[Array, Array]:
+    """PSNR of a capture against a photograph, and how much lower that is than a second photograph's would be, each
+    ``(1 + C,)`` [dB] with all colours first."""
+    likeness, bound = (-10 * np.log10([shot[key].mean(), *shot[key]]) for key in ("apart", "noise"))
+    return likeness, bound - likeness
+
+
+def misfit(shots: Sequence[dict[str, Array]]) -> tuple[Array, Array]:
+    """What a twin is off by besides noise, by colour: the share of the light ``(C,)``, and its place along each axis
+    ``(C,)`` [px of the target], both rms and independent from pixel to pixel.
+
+    Together they tell how much further a capture is; one stands for the other where all pictures have details of one
+    size. By least squares over holograms, none below zero; what is left of each counts by its noise.
+    """
+    left, *contents = (np.array([shot[key] / shot["noise"] for shot in shots]).T for key in ("apart", "light", "slope"))
+    squares = [nnls(each, own - 1)[0] for each, own in zip(np.stack(contents, -1), left, strict=True)]
+    light, place = np.sqrt(squares).T
+    return light, place
 
 
 @dataclass(frozen=True)
 class Trial:
     """A twin that was tried.
 
-    label: of the method whose holograms were made through it; pictures: by name; display: scores on the display
-    ``(pictures,)`` by method; twins: by display of the trial and by method; the first is the twin. misfit: of a twin;
-    is_simulated: whether the display is.
+    label: of the method whose holograms were made through it; frame: a row a picture, columns ``(value, display,
+    method)``; the value ``score`` is of the display and of each of the trial, the twin first; ``likeness`` is that of a
+    capture there to a photograph, ``further`` how much higher that of a second photograph is, and then by colour [dB].
+    first: captures of the twin of the first picture, by method; off: light and place of ``misfit``, none of a network,
+    which has no noise; is_simulated: whether the display is.
     """
 
     name: str
     of: str
     label: str
     photographs: int
-    pictures: tuple[str, ...]
-    display: Mapping[str, NDArray[np.float64]]
-    twins: Mapping[str, Mapping[str, Shown]]
-    misfit: Misfit | None
+    frame: pd.DataFrame
+    first: Mapping[str, Tensor]
+    off: tuple[Array, ...] = ()
     is_simulated: bool = True
 
+    @cached_property
+    def means(self) -> pd.DataFrame:
+        """Over pictures: a row a method, columns ``(value, display)``, in the order of the study and of the trial."""
+        means: pd.DataFrame = self.frame.mean().unstack([0, 1], sort=False)
+        return means
+
     @property
-    def twin(self) -> Mapping[str, Shown]:
-        """The twin, by method."""
-        return self.twins[self.name]
+    def twins(self) -> list[str]:
+        """The displays of the trial: the twin, and those that know less."""
+        return list(self.means["further"])
 
-    def difference(self, label: str) -> Estimate:
+    def less(self, first: tuple[str, str], second: tuple[str, str]) -> Estimate:
+        """Score on a display by a method, less that of another."""
+        return mean_interval((self.frame["score"][first] - self.frame["score"][second]).to_numpy())
+
+    def difference(self, method: str) -> Estimate:
         """Score on the twin less score on the display; of the twin's own holograms: its flattery."""
-        return mean_interval(self.twin[label].scores - self.display[label])
+        return self.less((self.name, method), (self.of, method))
 
-    def pairs(self, name: str = "") -> list[Pair]:
-        """Every pair of methods, on the display and on one of the trial."""
-        shown = self.twins[name or self.name]
-        return [
-            Pair(
-                first,
-                second,
-                mean_interval(self.display[first] - self.display[second]),
-                mean_interval(shown[first].scores - shown[second].scores),
-            )
-            for first, second in itertools.combinations(self.display, 2)
-        ]
+    def pairs(self, twin: str = "") -> list[dict[str, Any]]:
+        """Every pair of methods: its difference on the display and on one of the trial, and how far these are apart;
+        the furthest first."""
+        rows = []
+        for pair in itertools.combinations(self.means.index, 2):
+            own, other = (self.less(*((name, each) for each in pair)) for name in (self.of, twin or self.name))
+            rows.append({"methods": pair, "display": own, "twin": other, "apart": abs(other.mean - own.mean)})
+        return sorted(rows, key=lambda row: -row["apart"])
 
-    def worst(self, name: str = "", learned: bool = False) -> Pair:
-        """The pair that a display of the trial has furthest off, of methods without a camera; or with one that has."""
-        return max(
-            (pair for pair in self.pairs(name) if (self.label in (pair.first, pair.second)) == learned),
-            key=lambda pair: pair.apart,
-        )
+    def worst(self, twin: str = "", learned: bool = False) -> float:
+        """How far a display of the trial is off in two methods without a camera; or with one that has [dB]."""
+        return next(row["apart"] for row in self.pairs(twin) if (self.label in row["methods"]) == learned)
 
-    def tau(self, name: str = "") -> float:
+    def tau(self, twin: str = "") -> float:
         """Kendall's tau between the orders of methods by their means."""
-        shown = self.twins[name or self.name]
-        means = [(scores.mean(), shown[label].scores.mean()) for label, scores in self.display.items()]
-        return float(kendalltau(*zip(*means, strict=True)).statistic)
+        means = self.means["score"]
+        return float(kendalltau(means[self.of], means[twin or self.name]).statistic)
 
     def trust(self) -> Trust:
         """What stands in the profile."""
-        flattery = self.difference(self.label)
-        gap = {label: round(float(shown.gaps[:, 0].mean()), 2) for label, shown in self.twin.items()}
-        error = round((flattery.high - flattery.low) / 2, 2)
-        off = (self.misfit.light, self.misfit.place) if self.misfit else ((), ())
-        light, place = (tuple(round(float(each), 4) for each in own) for own in off)
-        return Trust(self.of, self.photographs, len(self.pictures), gap, light, place, round(flattery.mean, 2), error)
+        flattery, gaps = self.difference(self.label), self.means["further", self.name]
+        known = {str(label): round(float(gap), 2) for label, gap in gaps.items()}
+        light, place = (tuple(round(float(each), 4) for each in own) for own in self.off or ((), ()))
+        mean, error = (round(value, 2) for value in (flattery.mean, (flattery.high - flattery.low) / 2))
+        return Trust(self.of, self.photographs, len(self.frame), known, light, place, mean, error)
 
 
-def tried(photographed: Photographed, trial: Photographed, name: str) -> Trial:
-    """Compare the photographs of a display with the captures of its twin. UserError: a cell of either is missing."""
-    pictures = tuple(dict.fromkeys(item for _, item in photographed.own))
-    labels = tuple(dict.fromkeys(label for label, _ in photographed.own))
-    targets = {item: photographed.target(item) for item in pictures}
-    display: dict[str, NDArray[np.float64]] = {}
-    twins: dict[str, dict[str, Shown]] = {each: {} for each in trial_names(name, photographed)}
-    on_twins, compared = trial.cells(), list[Compared]()
-    noise = {
-        item: Noise.of([photographed.pair(*key) for key in photographed.twice if key[1] == item]) for item in pictures
-    }
-    for label in labels:
-        own = {item: [photographed.captures(cell) for cell in same(photographed, label, item)] for item in pictures}
-        display[label] = np.array([np.mean([score for _, score in shots]) for shots in own.values()])
-        for each, shown in twins.items():
-            others = {item: trial.captures(on_twins[each][label, item][0]) for item in pictures}
-            shots = [Compared(own[item][0][0], others[item][0], targets[item], noise[item]) for item in pictures]
-            likeness, gaps = zip(*(further(shot) for shot in shots), strict=True)
-            compared += shots * (each == name)
-            scores = np.array([score for _, score in others.values()])
-            shown[label] = Shown(scores, torch.stack(likeness).numpy(), torch.stack(gaps).numpy())
-    learned = photographed.learned.provenance["captures"]
-    misfit = Misfit.of(compared) if photographed.row.name == "twin" else None  # a network has no noise
-    of, is_simulated = photographed.display.name, photographed.display.real is None
-    return Trial(name, of, photographed.label, learned, pictures, display, twins, misfit, is_simulated)
+def tried(photographed: Photographed, displays: Sequence[Profile], device: torch.device = CPU) -> Trial:
+    """Show the holograms of a display on those of a trial, the twin first, and compare. UserError: a photograph is
+    missing, or a display cannot be registered.
+
+    Of a method whose repeats have random starts the first is shown.
+    """
+    of, twice, own = photographed.display, photographed.twice, photographed.row.label
+    items = dict.fromkeys(item for _, item in photographed.own)
+    noise = {item: noise_of([photographed.pair(*key) for key in twice if key[1] == item]) for item in items}
+    values: dict[str, dict[tuple[str, str, str], float]] = {item: {} for item in items}
+    shots, first = list[dict[str, Array]](), dict[str, Tensor]()
+    for (label, item), cells in photographed.own.items():
+        scores = [photographed.captures(cell)[1] for cell in cells[: None if (label, item) in twice else 1]]
+        values[item]["score", of.name, label] = float(np.mean(scores))
+    for profile in displays:
+        bench = opened(photographed, profile, device)
+        for (label, item), cells in photographed.own.items():
+            target, photograph = photographed.target(item), photographed.captures(cells[0])[0]
+            capture = captured(photographed, bench, label, item)
+            shot = compared(photograph, capture, target, noise[item])
+            likeness, gaps = further(shot)
+            if profile is displays[0]:
+                shots.append(shot)
+                first.setdefault(label, capture)
+            keys = ("score", "likeness", "further", *COLOURS * (len(gaps) > len(COLOURS)))
+            shown = score(capture, target, metrics=("psnr",))[SCORE], likeness[0], *gaps
+            values[item] |= {(key, profile.name, label): each for key, each in zip(keys, shown, strict=False)}
+    frame = pd.DataFrame.from_dict(values, orient="index")
+    off = misfit(shots) if photographed.row.name == "twin" else ()
+    learned, is_simulated = photographed.learned.provenance["captures"], of.real is None
+    return Trial(displays[0].name, of.name, own, learned, frame, first, off, is_simulated)
 
 
-def same(photographed: Photographed, label: str, item: str) -> list[Cell]:
-    """The photographs of the hologram that is shown on the twin: all repeats, or the first of a method whose repeats
-    have random starts."""
-    return photographed.own[label, item][: None if (label, item) in photographed.twice else 1]
-
-
-def write_twin(folder: Path, photographed: Photographed, trial: Photographed, found: Trial, profile: Path) -> Path:
-    """Write ``report.md`` and its pictures; returns the path of the former."""
-    _draw(folder, photographed, trial, found)
-    path, less = folder / "report.md", len(found.twins) > 1
-    text = blocks(
-        [
-            heading(f"{found.name}: {'the twin of' if less else 'a network in the place of'} {found.of}", 1),
-            bullets(answer(found)),
-            Markdown("![A picture on the display and on its twin]({})").format(Markdown(PICTURES)),
-            "The first picture, matched to its target; of a large one its most detailed part. Differences to the "
-            "photograph in linear light, without their sign.",
-            heading("The same holograms on both"),
-            _methods(found),
-            f"PSNR in linear light, means over {len(found.pictures)} pictures that the twin did not learn from, with "
-            "95 % intervals. Against a photograph: of a capture of the twin. Further: how much higher that of a second "
-            "photograph is, which differs by noise alone; of all colours, and of each.",
-            Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
-            *(["Pale: the twin with its maps turned by half a turn (x), and without maps (+)."] if less else []),
-            heading("Differences of two methods"),
-            _pairs(found),
-            *(_others(found) if less else []),
-            *_parameters(photographed, less),
-            heading("How to use it"),
-            bullets(_use(found, profile, less)),
-        ]
-    )
-    write_atomically(path, f"{text}\n".encode())
-    return path
-
-
-def answer(found: Trial) -> Iterable[str]:
+def answer(found: Trial) -> Iterator[str]:
     """What a lab has to know before it uses the twin."""
-    gaps = {label: float(shown.gaps[:, 0].mean()) for label, shown in found.twin.items()}
     flattery = found.difference(found.label)
-    (least, nearest), *_, (most, furthest) = sorted((gap, label) for label, gap in gaps.items())
+    (nearest, least), *_, (furthest, most) = found.means["further", found.name].sort_values().items()
     yield (
         f"A capture of the twin is further from a photograph than a second photograph is by {least:.1f} dB ({nearest}) "
         f"to {most:.1f} dB ({furthest})."
     )
-    if found.misfit:
-        yield (
-            f"Besides noise it is off by as much as {max(found.misfit.light):.1%} of the light and "
-            f"{max(found.misfit.place):.2f} pixels out of place would make, both rms."
-        )
+    if found.off:
+        light, place = map(max, found.off)
+        off = f"{light:.1%} of the light and {place:.2f} pixels out of place would make, both rms."
+        yield f"Besides noise it is off by as much as {off}"
     sentence = f"Flattery: holograms made through the twin score {_signed(flattery)} dB more on it than on the display."
     if flattery.mean > MOST:
         sentence += f" That is more than {MOST:g} dB: it does not tell which method that learns is better."
-        sentence += f" {len(found.pictures)} pictures do not tell it from less; try more." * (flattery.low < MOST)
+        sentence += f" {len(found.frame)} pictures do not tell it from less; try more." * (flattery.low < MOST)
     yield sentence
-    plain, learned = found.worst(), found.worst(learned=True)
     yield (
-        f"A difference of two methods below {plain.apart:.1f} dB tells nothing of the display, nor one below "
-        f"{learned.apart:.1f} dB where a method has learned the display: the twin is off by as much."
+        f"A difference of two methods below {found.worst():.1f} dB tells nothing of the display, nor one below "
+        f"{found.worst(learned=True):.1f} dB where a method has learned the display: the twin is off by as much."
     )
     if len(found.twins) == 1:
         yield "A network has no noise, and the display has: that is a part of its flattery and of its distance."
@@ -219,96 +220,100 @@ def _signed(estimate: Estimate) -> str:
     return f"{estimate.mean:+.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
-def _methods(found: Trial) -> Markdown | None:
-    lines = []
-    for label, scores in sorted(found.display.items(), key=lambda item: -float(item[1].mean())):
-        shown = found.twin[label]
-        gap, *of_colours = (f"{gap:.2f}" for gap in shown.gaps.mean(0))
-        line = {
-            "method": f"{label} (flattery)" if label == found.label else label,
-            "display [dB]": f"{scores.mean():.2f}",
-            "twin [dB]": f"{shown.scores.mean():.2f}",
+def write_twin(folder: Path, photographed: Photographed, found: Trial, profile: Path) -> Path:
+    """Write ``report.md`` and its pictures; returns the path of the former."""
+    _draw(folder, photographed, found)
+    known = Training("", (), found.of, TrainingRecord(photographed.learned.provenance, ()))
+    has_equations, learned = len(found.twins) > 1, list(estimates(known))
+    means, of, twin = found.means.sort_values(("score", found.of), ascending=False), found.of, found.name
+    methods = [
+        {
+            "method": f"{label}{' (flattery)' * (label == found.label)}",
+            "display [dB]": f"{own['score', of]:.2f}",
+            "twin [dB]": f"{own['score', twin]:.2f}",
             "twin less display [dB]": _signed(found.difference(label)),
-            "against a photograph [dB]": f"{shown.likeness[:, 0].mean():.1f}",
-            "further [dB]": gap,
+            "against a photograph [dB]": f"{own['likeness', twin]:.1f}",
+            "further [dB]": f"{own['further', twin]:.2f}",
+            **{colour: f"{own[colour, twin]:.2f}" for colour in COLOURS if (colour, twin) in own},
         }
-        lines.append(line | (dict(zip(COLOURS, of_colours, strict=True)) if len(of_colours) == len(COLOURS) else {}))
-    return table_of(lines)
-
-
-def _pairs(found: Trial) -> Markdown | None:
-    return table_of(
-        [
-            {
-                "methods": f"{pair.first} less {pair.second}",
-                "display [dB]": _signed(pair.display),
-                "twin [dB]": _signed(pair.twin),
-                "apart [dB]": f"{pair.apart:.2f}",
-            }
-            for pair in sorted(found.pairs(), key=lambda pair: -pair.apart)
-        ]
-    )
-
-
-def _others(found: Trial) -> Iterable[Markdown | str | None]:
-    yield heading("Beside twins that know less")
-    yield table_of(
-        [
-            {
-                "display": name,
-                "further, mean [dB]": f"{np.mean([each.gaps[:, 0].mean() for each in shown.values()]):.1f}",
-                "Kendall's tau": f"{found.tau(name):.2f}",
-                "two without a camera, off by [dB]": f"{found.worst(name).apart:.1f}",
-            }
-            for name, shown in found.twins.items()
-        ]
-    )
-    yield (
-        f"Only what the first row has and the others lack is knowledge of {found.of}: a column in which the second is "
-        "as good tells nothing."
-    )
-
-
-def _parameters(photographed: Photographed, in_halves: bool) -> Iterable[Markdown | str | None]:
-    rows = photographed.learned.provenance.get("estimates") or []
-    if not rows:
-        return
-    yield heading("What it says of the display")
-    yield quantities(rows)
-    if not in_halves:
-        return
-    hidden = [QUANTITIES[row["name"]].words for row in rows if row.get("seen") is False]
-    yield (
-        "Stated errors are meant to hold with 90 %: how far fits to halves of the photographs, of different holograms, "
-        "move apart, and no less than what was left on simulated displays. In brackets the truth, where the display is "
-        "simulated."
-    )
-    if hidden:
-        yield f"No photograph shows: {', '.join(dict.fromkeys(hidden))}."
-
-
-def _use(found: Trial, profile: Path, has_equations: bool) -> Iterable[str | Markdown]:
-    yield Markdown("In a config: {}; with every command that takes a display: {}.").format(
-        code(f"display: {{profiles: [{profile.name}]}}"), code(f"--display {profile.name}")
-    )
-    yield (
-        f"It has learned {found.of} from {found.photographs} photographs, on this panel: a smaller one is refused, a "
-        "larger one becomes this. What drifts or flickers on the display does not do so here."
-    )
+        for label, own in zip(map(str, means.index), means.to_dict("records"), strict=True)
+    ]
+    pairs = [
+        {
+            "methods": " less ".join(row["methods"]),
+            "display [dB]": _signed(row["display"]),
+            "twin [dB]": _signed(row["twin"]),
+            "apart [dB]": f"{row['apart']:.2f}",
+        }
+        for row in found.pairs()
+    ]
+    others = [
+        {
+            "display": name,
+            "further, mean [dB]": f"{means['further', name].mean():.1f}",
+            "Kendall's tau": f"{found.tau(name):.2f}",
+            "two without a camera, off by [dB]": f"{found.worst(name):.1f}",
+        }
+        for name in found.twins
+    ]
+    hidden = dict.fromkeys(QUANTITIES[row["name"]].words for row in learned if row.get("seen") is False)
     alike = "have the equations of the bench fit a twin" if has_equations else "resemble the network fit it"
-    yield f"Methods that {alike} better than the display: expect less there."
+    what = "the twin of" if has_equations else "a network in the place of"
+    text = [
+        heading(f"{found.name}: {what} {found.of}", 1),
+        bullets(answer(found)),
+        Markdown("![A picture on the display and on its twin]({})").format(Markdown(PICTURES)),
+        "The first picture, matched to its target; of a large one its most detailed part. Differences to the "
+        "photograph in linear light, without their sign.",
+        heading("The same holograms on both"),
+        table_of(methods),
+        f"PSNR in linear light, means over {len(found.frame)} pictures that the twin did not learn from, with "
+        "95 % intervals. Against a photograph: of a capture of the twin. Further: how much higher that of a second "
+        "photograph is, which differs by noise alone; of all colours, and of each.",
+        Markdown("![Scores on display and twin]({})").format(Markdown(SCORES)),
+        has_equations and "Pale: the twin with its maps turned by half a turn (x), and without maps (+).",
+        heading("Differences of two methods"),
+        table_of(pairs),
+        has_equations and heading("Beside twins that know less"),
+        has_equations and table_of(others),
+        has_equations
+        and f"Only what the first row has and the others lack is knowledge of {found.of}: a column in which the second "
+        "is as good tells nothing.",
+        learned and heading("What it says of the display"),
+        quantities(learned),
+        learned
+        and has_equations
+        and "Stated errors are meant to hold with 90 %: how far fits to halves of the photographs, of different "
+        "holograms, move apart, and no less than what was left on simulated displays. In brackets the truth, where the "
+        "display is simulated.",
+        has_equations and hidden and f"No photograph shows: {', '.join(hidden)}.",
+        heading("How to use it"),
+        bullets(
+            [
+                Markdown("In a config: {}; with every command that takes a display: {}.").format(
+                    code(f"display: {{profiles: [{profile.name}]}}"), code(f"--display {profile.name}")
+                ),
+                f"It has learned {found.of} from {found.photographs} photographs, on this panel: a smaller one is "
+                "refused, a larger one becomes this. What drifts or flickers on the display does not do so here.",
+                f"Methods that {alike} better than the display: expect less there.",
+            ]
+        ),
+    ]
+    path = folder / "report.md"
+    write_atomically(path, f"{blocks(text)}\n".encode())
+    return path
 
 
-def _draw(folder: Path, photographed: Photographed, trial: Photographed, found: Trial) -> None:
-    item, on_twins = found.pictures[0], trial.cells()
-    target, rows = photographed.target(item), {}
-    twice = [label for label, each in photographed.twice if each == item]
-    for label in dict.fromkeys(label for label in (photographed.study.baseline, found.label) if label in twice):
-        first, second = photographed.pair(label, item)
-        twin = trial.captures(on_twins[found.name][label, item][0])[0]
-        shown = match(first, target)[0]
-        rows[label] = shown, match(second, shown)[0], match(twin, shown)[0]
+def _draw(folder: Path, photographed: Photographed, found: Trial) -> None:
+    item, rows = found.frame.index[0], {}
+    target = photographed.target(item)
+    for label in dict.fromkeys([photographed.study.baseline, found.label]):
+        if (label, item) in photographed.twice:
+            first, second = photographed.pair(label, item)
+            first = match(first, target)[0]
+            rows[label] = first, match(second, first)[0], match(found.first[label], first)[0]
     draw_twin_pictures(folder / PICTURES, f"{found.of} and {found.name}", (item, target), rows)
     names = {entry.label: entry.name for entry in photographed.study.methods}
-    own, *others = ({label: each.scores for label, each in shown.items()} for shown in found.twins.values())
-    draw_twin_scores(folder / SCORES, found.display, own, looks(names), others)
+    scores = found.frame["score"]
+    display, twin, *others = ({key: scores[name, key] for key in scores[name]} for name in (found.of, *found.twins))
+    draw_twin_scores(folder / SCORES, display, twin, looks(names), others)

@@ -12,8 +12,9 @@ from typing import Any
 
 from ..core import plugins
 from ..core.errors import UserError, suggest
+from ..core.parts import divided, load_config
 from ..core.schema import placed, typed
-from ..core.yaml_source import Document, Keys, load
+from ..core.yaml_source import Document, Keys
 from ..display import DisplaySpec
 from ..display.simulated.changes import KINDS, Value, altered, checked
 from ..display.simulated.profile import load_profile
@@ -23,7 +24,7 @@ from ..metrics import catalogue, control
 from ..metrics.lpips import find_weights
 from . import isolation
 from .changes import Changes, changed, chosen
-from .definition import PREDICTIONS, STACKS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
+from .definition import STACKS, DisplayGrid, MethodEntry, Probe, Protocol, Study, Sweep, Targets, Training
 from .displays import condition, displays, real_condition
 from .identity import SPECKLE
 from .plan import FLOORS, REFERENCE, is_reference
@@ -36,8 +37,8 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     Parameters
     ----------
     path
-        A YAML file; relative paths of code, profiles, benches and weights in it start in its folder, other ones in
-        ``params`` in the working directory.
+        A YAML file, or a part of one such as ``depth.yaml/frames``; relative paths of code, profiles, benches and
+        weights in it start in its folder, other ones in ``params`` in the working directory.
     changes
         What the command line changes in it; a fault of such a value is told at its option.
 
@@ -56,12 +57,13 @@ def load_study(path: Path | str, changes: Changes | None = None) -> Study:
     >>> load_study("configs/quick.yaml").labels
     ('double_phase', 'gerchberg_saxton', 'wirtinger', 'hil_plus')
     """
-    document, changes = load(Path(path)), changes or Changes()
+    (file, part), document, changes = divided(Path(path)), load_config(Path(path)), changes or Changes()
     document = changed(replace(document, data=_long_form(document.data)), changes, Study.__dataclass_fields__)
     study = typed(document, Study, _long_form(document.data))
-    study = _with_grids(replace(study, file=Path(path), text=document.text, changes=changes), document)
+    for other in map(load_config, [file / name for name in study.parts]):  # before the first of them is run
+        typed(other, Study, _long_form(other.data))
+    study = _with_grids(replace(study, file=file, part=part, text=document.text, changes=changes), document)
     study = _with_chosen_methods(study)
-    _check_related(study, document)
     study = replace(study, targets=_targets(study, document), protocol=_protocol(study, document))
     study = replace(study, training=_training(study, document), holograms=_holograms(study, document))
     study = replace(study, display=_display(study, document))
@@ -306,18 +308,6 @@ def _sweeps(study: Study, document: Document) -> Iterator[Sweep]:
                 raise document.error(place, f"{kind} {given} is listed twice")
             seen |= shown
         yield replace(sweep, values=tuple(values), count=None, profiles=profiles)
-
-
-def _check_related(study: Study, document: Document) -> None:
-    """Refuse names of no config in the folder and of studies that score pictures, and any in a related study."""
-    for index, name in enumerate(study.related):
-        where: Keys = ("related", index)
-        if study.predicts:
-            raise document.error(where, "predictions have no related studies; the study of pictures names them")
-        with placed(document, where, where):
-            measure = load(study.folder / f"{name}.yaml").data.get("measure")
-        if measure not in PREDICTIONS:
-            raise document.error(where, f"'{name}' measures no predictions; name an error budget or predictions")
 
 
 def _subset(study: Study, document: Document, named: tuple[str, ...], where: Keys) -> tuple[str, ...]:

@@ -236,10 +236,11 @@ class Study:
     the report leads with, a metric and a domain; save: what else is written beside the scores.
     isolation: ``files`` runs methods that do not ship with the package in processes of their own, ``process`` all but
     those that look into the bench, ``none`` no method; limits: what such a process may take for a cell; reported:
-    published figures to print beside the measured ones; related: names of error budgets and predictions of the same
-    displays, whose configs and reports lie beside this one's: a study over many displays holds margins against them;
-    board: whether its cards come first on a site.
-    file, text: the config file as the user named it, and what is in it; changes: those of the command line.
+    published figures to print beside the measured ones; board: whether its cards come first on a site; parts: further
+    studies by name, each with the keys that differ from those of this one (null: without the key); their reports lie in
+    its folder.
+    file, text: the config file as the user named it, and the keys in it; part: its name, where it is a part of another
+    study; changes: those of the command line.
     """
 
     title: Text
@@ -263,9 +264,10 @@ class Study:
     isolation: Isolation = "files"
     limits: Limits = Limits()
     reported: Reported | None = None
-    related: tuple[Text, ...] = ()
     board: bool = False
+    parts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     file: Path = field(default=Path(), metadata={"key": False})
+    part: str = field(default="", metadata={"key": False})
     text: str = field(default="", metadata={"key": False})
     changes: Changes = field(default=Changes(), metadata={"key": False})
 
@@ -275,9 +277,14 @@ class Study:
         return self.file.parent
 
     @property
+    def config(self) -> Path:
+        """The study as a command has it: the config's file, and the part behind it."""
+        return self.file / self.part
+
+    @property
     def name(self) -> str:
-        """The config's file name without its ending; the default name of the output folder."""
-        return self.file.stem
+        """The config's file name without its ending, and the part behind it; the default name of the output folder."""
+        return Path(self.file.stem, self.part).as_posix()
 
     @cached_property
     def dataset(self) -> Any:

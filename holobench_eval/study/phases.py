@@ -161,10 +161,15 @@ class Starts:
         return phase
 
 
-def phases_of(output: Path, study: Path = Path()) -> Phases:
-    """The phases that a study with this output folder shares: with all of ``holoeval-results``, else with none."""
-    beside, own = output.absolute().parent, output / "solved"
-    return Phases(beside / "solved", study, own) if beside.name == RESULTS else Phases(own, study)
+def phases_of(output: Path, study: Path = Path(), part: str = "") -> Phases:
+    """The phases that a study with this output folder shares: with all of ``holoeval-results``, else with its parts.
+
+    part: the name of the study where it is a part, whose folder lies in that of its study.
+    """
+    own, first = output / "solved", output.parent if part and output.name == part else output
+    beside = first.absolute().parent
+    shared = (beside if beside.name == RESULTS else first) / "solved"
+    return Phases(own, study) if shared == own else Phases(shared, study, own)
 
 
 def start_of(phase: Tensor) -> Tensor:

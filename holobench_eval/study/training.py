@@ -80,7 +80,7 @@ def _train(job: TrainingJob, artifacts: Artifacts, device: torch.device) -> None
     source = {"dataset": preparation.training.dataset, "params": dict(preparation.training.params)}
     source |= {"code": preparation.images_version} if preparation.images_version else {}
     draw, spec = ("training", preparation.seed), preparation.display.spec
-    phases = phases_of(setting.output, study.folder)
+    phases = phases_of(setting.output, study.folder, study.part)
     shared = {
         item: Starts(phases, basis({**source, "sha256": sha256}, spec, draw), device, read)
         for item, sha256 in preparation.images

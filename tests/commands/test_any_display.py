@@ -74,9 +74,7 @@ def test_every_command_that_takes_a_display_works_on_it(tmp_path, monkeypatch):
         bits = 8 if words == ("session", "export") else 1  # patterns are written with 8
         Path("mine.yaml").write_text(PROFILE.format(shape=PANEL, bits=bits))
         done = CliRunner().invoke(app, [*words, *arguments(words, function, tmp_path, PANEL)])
-        is_fitted = words != ("calibrate",)
-        told = words, done.output, done.exception
-        assert done.exit_code == 0 if is_fitted else "is not fitted to anything" in str(done.exception), told
+        assert done.exit_code == 0, (words, done.output, done.exception)
     assert Path("sheet.png").is_file()
     assert {path.parts[0] for path in Path().glob("**/figures/*stages*.png")} == {"holoeval-results"}
     assert any("figures/stages" in name for name in ZipFile("solved/study.zip").namelist())

@@ -61,7 +61,7 @@ def holoeval(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 @pytest.mark.parametrize("by", ["numpy", "torch"])
 def test_memory_that_is_used_up_is_one_line(monkeypatch, call, by):
-    def full() -> None:
+    def full(**_: str) -> None:
         np.empty(2**60, np.uint8) if by == "numpy" else torch.empty(2**60, dtype=torch.uint8)
 
     monkeypatch.setattr("holobench_eval.commands.app", full)

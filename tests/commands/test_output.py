@@ -13,7 +13,7 @@ from holobench_eval.commands import _plain
 from holobench_eval.commands.output import MOST_REASONS, console, print_answer, print_headline, print_holes
 from holobench_eval.report import Results, records_frame
 from holobench_eval.report.stories import answer
-from tests.support.synthetic_study import cell, layout, record, study
+from tests.support.synthetic_study import cell, facts, record, study
 
 LONG = "a method whose label is as long as a label may ever be, sixty"
 
@@ -24,7 +24,7 @@ def records(tmp_path_factory):
 
 
 def found(records: list[dict[str, Any]], **changes: Any) -> Results:
-    shape = layout(**changes)
+    shape = facts(**changes)
     return Results(records_frame(records, shape), shape)
 
 
@@ -41,7 +41,7 @@ def printed(results: Results, encoding: str = "utf-8", width: int = 80) -> list[
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_tables_fit_a_terminal_of_80_columns_and_show_every_number(records, encoding):
     renamed = [{**one, "label": LONG if one["label"] == "HIL" else one["label"]} for one in records]
-    pairs = tuple((LONG if label == "HIL" else label, name) for label, name in layout().pairs)
+    pairs = tuple((LONG if label == "HIL" else label, name) for label, name in facts().pairs)
     results = found(renamed, pairs=pairs, camera=frozenset({LONG}), reported={})
     lines = printed(results, encoding)
     assert max(map(len, lines)) <= 80

@@ -157,6 +157,8 @@ def test_what_has_no_name_is_told_by_its_correlation_unless_the_display_was_seen
     said = phase_doubt(bent, target, display.spec)
     assert re.match(r"makes its target less well than phases for these optics can \(correlation 0\.\d\d with", said)
     assert phase_doubt(bent % TAU, target, display.spec, seen=True) == ""
+    assert phase_doubt(bent, target, display.spec, computed=True) == ""
+    assert "opposite sign" in phase_doubt(-phase, target, display.spec, computed=True)
 
 
 def test_a_right_phase_takes_one_propagation(display, target, solved, monkeypatch) -> None:

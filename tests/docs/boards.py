@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from holobench_eval.commands.options import planned as plans
 from holobench_eval.commands.reports.report import load
 from holobench_eval.report import Results, facts_of, records_frame
 from holobench_eval.report.charts.tiles import Thumbnails, draw_rows
@@ -63,25 +64,14 @@ def apart(row: dict[str, Any]) -> str:
 
 
 def draw_picture(study: str, display: str) -> None:
-    """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of differences nearest the table's."""
-    planned, records, folder, *_ = load(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)
+    """Captures of ``SHOWN``: of targets whose pictures the report keeps, that of differences nearest the mean ones."""
+    planned, records, folder, *_ = load(*next(plans(ROOT / "configs" / f"{study}.yaml", ROOT / "reports" / study)))
     facts = facts_of(planned)
     results = Results(records_frame(records, facts), facts)
-    baseline, *others = (results.values(label, display) for label in SHOWN)
     kept = Thumbnails(results, folder)
-
-    def distance(target: str) -> float:
-        at = results.targets.index(target)
-        differences = [values - baseline for values in others]
-        return sum((each[at] - each.mean()) ** 2 for each in differences)
-
-    def tiles(target: str) -> list[Any]:
-        return [(label, kept.tile(label, display, target)) for label in SHOWN]
-
-    pictures = kept.targets(display)
-    complete = [target for target in pictures if all(tile.picture is not None for _, tile in tiles(target))]
-    target = min(complete, key=distance)
-    draw_rows(PICTURE, display, (target, pictures[target]), [("", tiles(target))])
+    target = kept.typical(SHOWN, display)[0]
+    tiles = [(label, kept.tile(label, display, target)) for label in SHOWN]
+    draw_rows(PICTURE, display, (target, kept.targets(display)[target]), [("", tiles)])
 
 
 if __name__ == "__main__":

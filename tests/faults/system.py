@@ -172,7 +172,7 @@ def dask(victim: int) -> Callable[..., Told]:
         finally:
             for each in cluster:
                 each.kill()
-                each.join()
+                each.join(LONGEST)
 
     return fault
 

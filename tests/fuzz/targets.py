@@ -76,9 +76,7 @@ def _read_phases(content: bytes, folder: Path) -> object:
 
 
 def _configs() -> list[bytes]:
-    return [
-        (ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("quick", "vision", "table2", "rank-stability")
-    ]
+    return [(ROOT / "configs" / f"{name}.yaml").read_bytes() for name in ("quick", "lens", "table3", "family")]
 
 
 def _profiles() -> list[bytes]:
@@ -167,7 +165,7 @@ def _manifests() -> list[bytes]:
 
 
 def _csv() -> list[bytes]:
-    lines = (ROOT / "reports/focus/records.csv").read_bytes().splitlines(keepends=True)
+    lines = (ROOT / "reports/depth/records.csv").read_bytes().splitlines(keepends=True)
     return [b"".join(lines[:4]), lines[0]]
 
 
@@ -183,7 +181,7 @@ TARGETS = {
     "maps": Target(_read_maps, _maps),
     "provenance": Target(
         lambda content, folder: read_provenance(_file(folder, "provenance.json", content).parent),
-        lambda: [(ROOT / "reports/focus/provenance.json").read_bytes()[:4000], b'{"earlier": [{}]}'],
+        lambda: [(ROOT / "reports/depth/provenance.json").read_bytes()[:4000], b'{"earlier": [{}]}'],
     ),
     "manifest": Target(lambda content, folder: read_manifest(_file(folder, MANIFEST, content).parent), _manifests),
     "message": Target(

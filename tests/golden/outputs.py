@@ -222,6 +222,8 @@ def _scores(metric: str | None) -> dict[str, Tensor]:
     if not metric:  # black in one colour, nearly so in another
         factors = match(capture, target * torch.tensor([1.0, 0.01, 0.0]).view(3, 1, 1))[1].tolist()
         kept |= {f"scale_{channel} of a target in red": factor for channel, factor in enumerate(factors)}
+        for kind in ("", "stored "):  # together: a turn of nearly zero has no size of its own, and moves by rounding
+            kept[f"{kind}refine"] = [kept.pop(f"{kind}refine_{part}") for part in ("dx_px", "dy_px", "theta_deg")]
     return {name: torch.tensor(value, dtype=torch.float64) for name, value in kept.items()}
 
 

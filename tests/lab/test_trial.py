@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from holobench_eval.commands.own.new import write_code
-from holobench_eval.lab.counts import hot_pixels
 from holobench_eval.lab.trial import tried
 from holobench_eval.testing import table
 from tests.lab.session.running import run
@@ -110,9 +109,3 @@ def test_the_command_takes_files_and_a_bench_file_and_fails_with_a_fault(devices
     monkeypatch.setattr(table, "grab", lambda seconds, bits: None)
     with pytest.raises(AssertionError, match="fault: simulated camera gave object of"):
         run("doctor", devices[0])  # an exit code of 1
-
-
-def test_hot_pixels_are_those_brighter_than_all_around_them():
-    frame = np.random.default_rng(0).integers(0, 300, (40, 40)).astype(np.uint16)
-    frame[10, 10], frame[0, 0], frame[20:22, 20] = 4000, 1000, 4000
-    assert [tuple(place) for place in np.argwhere(hot_pixels(frame, 4095))] == [(0, 0), (10, 10)]

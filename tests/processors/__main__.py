@@ -30,10 +30,12 @@ def run(tests: str, number: int, ulps: float, file: Path) -> None:
     environment = os.environ | {FILE: str(partly), "PYTHONPYCACHEPREFIX": str(file.parent / "compiled")}
     plugins = ["-p", "tests.processors.margins"]
     if number:
-        environment |= {NUMBER: str(number), ULPS: str(ulps)}
+        # The process that others are forked from finds the noise by its name.
+        environment |= {NUMBER: str(number), ULPS: str(ulps), "PYTHONPATH": str(ROOT)}
         plugins += ["-p", "tests.processors.noise"]
     command = [sys.executable, "-m", "pytest", "-n0", "-q", "--tb=short", "-p", "no:cacheprovider", *plugins]
-    command += ["-o", "enable_assertion_pass_hook=true", *tests.split()]
+    settings = "enable_assertion_pass_hook=true", "timeout=0", "faulthandler_timeout=0"
+    command += [*(part for setting in settings for part in ("-o", setting)), *tests.split()]
     with file.with_suffix(".log").open("w") as log:
         subprocess.run(command, cwd=ROOT, env=environment, stdout=log, stderr=log, check=False)
     partly.rename(file)

@@ -50,7 +50,8 @@ COMPLEX = "mul div abs sgn reciprocal"
 ARRAYS = (
     (np.fft, "transform", "fft2 ifft2 rfft2 irfft2"),
     (np.linalg, "product", "inv solve lstsq"),
-    (cv2, "product", "GaussianBlur blur resize remap warpPerspective warpAffine matchTemplate"),
+    (cv2, "product", "GaussianBlur blur resize matchTemplate"),
+    (cv2, "sampled", "remap warpPerspective warpAffine"),
     (cv2, "function", "findHomography perspectiveTransform getPerspectiveTransform"),
 )
 
@@ -139,7 +140,14 @@ def _kernel(processor: Processor, which: str) -> Callable[..., None]:
 def _array(processor: Processor, computed: Callable[..., Any], kind: str) -> Callable[..., Any]:
     @wraps(computed)
     def other(*args: Any, **more: Any) -> Any:
-        return processor.changed(computed(*args, **more), kind)
+        result = computed(*args, **more)
+        if kind != "sampled":
+            return processor.changed(result, kind)
+        whole_pixels = np.isin(result, args[0])  # weights of one and zeros, which every processor adds exactly
+        exact = result[whole_pixels]
+        result = processor.changed(result, "product")
+        result[whole_pixels] = exact
+        return result
 
     return other
 

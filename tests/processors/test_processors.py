@@ -4,11 +4,13 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 from torch.nn import functional
 
+from holobench_eval.imaging.warp import remap
 from holobench_eval.optics import AngularSpectrum, FourierLens
 from holobench_eval.optics.phasor import squared_modulus
 from tests.golden.outputs import cases, recorded, share
@@ -69,6 +71,15 @@ def test_what_is_whole_is_exact_on_every_processor() -> None:
     with another(1):
         assert torch.equal(counts.sum(0), torch.tensor([12.0, 15.0, 18.0, 21.0]))
         assert torch.equal(torch.zeros(3).cos(), torch.ones(3))
+
+
+def test_a_pixel_that_is_copied_is_exact_and_an_interpolated_one_is_not() -> None:
+    frame = np.random.default_rng(1).random((6, 8)).astype(np.float32)
+    x, y = np.meshgrid(np.arange(5, dtype=np.float32), np.arange(4, dtype=np.float32))
+    between = remap(frame, x + 0.25, y)
+    with another(1):
+        assert np.array_equal(remap(frame, x + 1, y), frame[:4, 1:6])
+        assert not np.array_equal(remap(frame, x + 0.25, y), between)
 
 
 def test_a_golden_moves_by_less_than_a_third_of_its_tolerance() -> None:

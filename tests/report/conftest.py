@@ -1,4 +1,4 @@
-"""A browser for the pages of reports and sites; playwright has one a process."""
+"""A browser for the pages of reports and sites."""
 
 import shutil
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # Chromium and playwright's loop end before other tests start processes
 def browser() -> Iterator[Any]:
     """Debian's Chromium; skipped where it or playwright is missing."""
     sync_api = pytest.importorskip("playwright.sync_api")

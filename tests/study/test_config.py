@@ -3,9 +3,11 @@ from pathlib import Path
 import pytest
 
 from holobench_eval.core.errors import UserError
+from holobench_eval.core.parts import load_config
 from holobench_eval.study.changes import Changes
 from holobench_eval.study.config import load_study
-from tests.study.studies import assert_refused, exchanged
+from holobench_eval.study.plan import plan
+from tests.study.studies import assert_refused, exchanged, one_line
 from tests.support import plugins
 
 DATASETS = plugins.text("sets")
@@ -94,6 +96,7 @@ STRUCTURE = [
     ("psnr: 17.6", "psnr: high", "15:49: reported.rows.GS.psnr should be a valid number"),
     ("repeats: 2", "protocol: {version: v1}", "11:21: protocol.version should be 'v2'"),
     ("repeats: 2", "protocol: {metrics: [psnr, sism]}", "11:28: unknown metric 'sism'; did you mean 'ssim'?"),
+    ("repeats: 2", "parts: [a]", "11:8: parts should be a mapping of names to the keys that differ"),
 ]
 BEYOND = [  # structure: mistakes about other values, files, images and optics, which the schema cannot find
     ("profiles: [ideal]\n", "profiles: [ideal, ideal]\n", "4:21: 'ideal' and 'ideal' are both named 'ideal'"),
@@ -118,9 +121,9 @@ BEYOND = [  # structure: mistakes about other values, files, images and optics, 
     ("rows: {GS", "beside: idael, rows: {GS", "15:39: 'idael' is not in display.profiles; did you mean 'ideal'?"),
     ("repeats: 2", "protocol: {lpips_weights: no.pth}", "11:27: LPIPS weights: no such file or folder"),
     ("headline: ssim_srgb", "headline: ms_ssim_linear", "13:11: 'ideal' scores 104 x 208 pixels; ms_ssim needs 161"),
-    ("repeats: 2", "related: [absent]", "11:11: "),
-    ("repeats: 2", "related: [study]", "11:11: 'study' measures no predictions; name an error budget or"),
-    ("repeats: 2", "measure: prediction\nrelated: [study]", "12:11: predictions have no related studies"),
+    ("repeats: 2", "parts: {a: {sede: 3}}", "11:13: unknown key 'sede' in the document; did you mean 'seed'?"),
+    ("repeats: 2", "parts: {a: {seed: -3}}", "11:19: seed should be greater than or equal to 0, got -3"),
+    ("repeats: 2", "parts: {a: {title: null}}", "11:20: missing key 'title'"),
     ("repeats: 2", "protocol: {metrics: [psnr]}", "11:21: the headline is 'ssim_srgb'; add ssim to the metrics, or "),
 ]
 
@@ -136,6 +139,25 @@ def test_one_method_twice_with_the_same_parameters_is_refused(tmp_path):
     assert_refused(write(tmp_path, text), "10:5: methods[1] has the method, parameters and display")
 
 
+def test_a_part_is_the_study_that_it_would_be_as_a_config_of_its_own(tmp_path):
+    parts = "parts:\n  other: {seed: 8, methods: [sgd], baseline: null, reported: null}\n"
+    text = exchanged(FULL, ('{dataset: "sets.py:Images", params: {count: 3}}', "{dataset: charts}"))
+    first, alone = load_study(write(tmp_path, text + parts)), load_study(write(tmp_path, text))
+    assert plan(first).cells == plan(alone).cells
+    study = load_study(write(tmp_path, text + parts) / "other")
+    assert (study.name, study.config, study.folder) == ("study/other", tmp_path / "study.yaml" / "other", tmp_path)
+    (tmp_path / "own.yaml").write_text(study.text)
+    own = load_study(tmp_path / "own.yaml")
+    assert (own.seed, own.labels, own.baseline, own.reported) == (8, ("sgd",), "sgd", None)
+    assert plan(study).cells == plan(own).cells != plan(first).cells
+
+
+def test_a_fault_in_what_a_part_has_of_the_first_study_is_told_at_its_place_there(tmp_path):
+    config = write(tmp_path, f"{FULL}parts:\n  other: {{methods: [sgd]}}\n")
+    with one_line(at=f"{config}:12:11: no method has the label 'GS'"):
+        load_study(config / "other")
+
+
 def test_a_missing_config_is_named(tmp_path):
     with pytest.raises(UserError, match=r"absent\.yaml: no such file"):
         load_study(tmp_path / "absent.yaml")
@@ -143,9 +165,12 @@ def test_a_missing_config_is_named(tmp_path):
 
 def test_every_config_of_the_repository_asks_its_question_and_says_what_would_change_the_answer():
     for path in sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")):
-        if path.stem not in ("hil-paper", "peers", "photographs"):  # these need what is not here
-            assert "?" in load_study(path).question, path
-        assert all(f"\n{key}: " in path.read_text() for key in ("question", "would_change")), path
+        parts = load_config(path).data.get("parts", {})
+        for config in (path, *(path / part for part in parts)):
+            if path.stem not in ("hil-paper", "peers", "photographs"):  # these need what is not here
+                assert "?" in load_study(config).question, config
+            own = parts[config.name] if config != path else load_config(path).data
+            assert own.keys() > {"question", "would_change"}, config
 
 
 @pytest.mark.parametrize(("panel", "enough"), [("[64, 64]", (118, 118)), ("[64, 256]", (118, 256))])

@@ -85,6 +85,15 @@ def test_only_studies_of_a_folder_of_results_share_their_phases():
     assert phases_of(Path("here", "a")) == Phases(Path("here", "a", "solved"))
 
 
+@pytest.mark.parametrize("folder", ["there", RESULTS])
+def test_a_study_and_its_parts_share_their_phases(folder):
+    first = Path("here", folder, "a")
+    shared = phases_of(first).folder.absolute()
+    assert [phases_of(first / part, part=part).folder.absolute() for part in ("b", "c")] == [shared, shared]
+    assert phases_of(first / "b", part="b").own == first / "b" / "solved"
+    assert phases_of(first / "b").folder == phases_of(first / "other", part="b").folder.parents[1] / "b" / "solved"
+
+
 def test_a_phase_that_took_more_than_is_covered_is_that_of_its_output_alone(tmp_path):
     first, second = (phases_of(tmp_path / RESULTS / name) for name in "ab")
     for uncovered in (("an environment variable",), ()):

@@ -15,6 +15,7 @@ import typer
 from ...core.errors import CellError, UserError, one_line
 from ...core.installed import as_typed
 from ...core.panels import is_small
+from ...core.parts import divided
 from ..options import Learned
 from .rerun import rerun
 
@@ -157,7 +158,7 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
     if differs := difference(read_records(records), plan(study)):
         yield f"{differs}: the study or the code has changed; run the study again"
         return
-    command = f"run: holoeval report {shlex.quote(as_typed(study.file))} --output {shlex.quote(str(report))}"
+    command = f"run: holoeval report {shlex.quote(as_typed(study.config))} --output {shlex.quote(str(report))}"
     said_anew = text_digest(study.text) != known["config_sha256"]
     if said_anew:
         yield f"the text of the config has changed, but no cell; {command} (computes nothing)"
@@ -178,12 +179,11 @@ def _changes(report: Path, study: Study, known: dict[str, Any]) -> Iterator[str]
 
 
 def reports_in(folder: Path) -> list[Path]:
-    """The reports of studies in a folder, or the folder itself where it is one."""
+    """The reports of studies in a folder, or the folder itself where it is one, and those of their parts."""
     from ...study.running import provenance
 
-    if (folder / provenance.FILE).is_file():
-        return [folder]
-    return sorted(path.parent for path in folder.glob(f"*/{provenance.FILE}"))
+    below = ("", "*/") if (folder / provenance.FILE).is_file() else ("*/", "*/*/")
+    return sorted(path.parent for place in below for path in folder.glob(f"{place}{provenance.FILE}"))
 
 
 def finished(report: Path) -> tuple[Study, dict[str, Any]]:
@@ -198,7 +198,8 @@ def finished(report: Path) -> tuple[Study, dict[str, Any]]:
         raise UserError(f"{provenance.FILE} lacks {', '.join(lacking)}")
     config = report / str(known["config"])
     if "ended" in known and known["ended"] is None:
-        again = f"'holoeval run {config.resolve().name}' goes on with it"
+        file, part = divided(config)
+        again = f"'holoeval run {Path(file.name, part)}' goes on with it"
         raise UserError(f"a run into this folder is in progress, or was stopped before its end; {again}")
     missing = [name for name in NEEDED if not (report / name).is_file()]
     if missing:

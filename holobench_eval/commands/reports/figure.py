@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..options import Config, Output
+from ..options import Config, Output, planned
 from .report import load
 
 Medium = Literal["talk", "column", "double"]
@@ -25,9 +25,9 @@ def figure(
     from ...report.description import describe
     from ...report.story import Report
 
-    study, records, folder, known, _ = load(config, output)
+    study, records, folder, known, _ = load(*next(planned(config, output)))
     facts = facts_of(study)
-    results = Results(records_frame(records, facts), facts, related(facts, folder.parent))
+    results = Results(records_frame(records, facts), facts, related(facts, folder))
     report = Report(results, records, folder, known, describe(study))
     for path in print_figures(report, into, medium):
         print(path)

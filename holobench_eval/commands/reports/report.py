@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 
 def report(config: Config, output: Output = None) -> None:
-    """Write the report of a study again: from its records, or from a committed records.csv."""
-    study, records, folder, known, is_raw = load(config, output)
-    write_report(console(), study, records, folder, known, keep_pictures=not is_raw)
+    """Write the report of a study and its parts again: from their records, or from a committed records.csv."""
+    for each in reversed([*planned(config, output)]):  # the first study's has the answers of its parts
+        study, records, folder, known, is_raw = load(*each)
+        write_report(console(), study, records, folder, known, keep_pictures=not is_raw)
 
 
-def load(config: Path, output: Path | None) -> tuple[Study, list[dict[str, Any]], Path, dict[str, Any], bool]:
+def load(study: Study, folder: Path, grid: Plan) -> tuple[Study, list[dict[str, Any]], Path, dict[str, Any], bool]:
     """Load what a report is written from: a study, a record for every planned cell, the folder of its report, its
     provenance, and whether the records are those of a run, with pictures, and not a committed records.csv.
 
@@ -31,9 +32,8 @@ def load(config: Path, output: Path | None) -> tuple[Study, list[dict[str, Any]]
     from ...study.running import provenance
     from ...study.store import Store
 
-    study, folder, grid = planned(config, output)
     store, committed = Store(folder), folder / "records.csv"
-    raw, typed = store.folder.is_dir(), shlex.quote(as_typed(config))
+    raw, typed = store.folder.is_dir(), shlex.quote(as_typed(study.config))
     if not raw and not committed.is_file():
         raise UserError(f"{folder}: no records in this folder; holoeval run {typed} makes them")
     again = " ".join(filter(None, (f"holoeval run {typed} --output {shlex.quote(str(folder))}", str(study.changes))))

@@ -1,51 +1,14 @@
-"""A family of displays: which of them come near published figures, and what methods gain on those that do."""
+"""A family of displays: what methods gain on them, and what a lab can measure that tells it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from ...study.calibration.family import Range, Row
-from .look import PALE, Look, chart, grid, legend_below, medium
-
-SIDE, FRAME = 150, 90  # pixels: of a panel, around all
-BINS = 12
-FIT = "#1F4E8C"
-
-
-def draw_corner(path: Path, parameters: Sequence[Range], rows: Sequence[Row], fit: Sequence[Row]) -> None:
-    """Draw each pair of some parameters, all draws pale, those that fit dark; on the diagonal how the latter lie."""
-    count, size = len(parameters), SIDE * len(parameters) + FRAME
-    with chart(path, size, count, count, size) as (figure, panels):
-        figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
-        for (down, across), panel in np.ndenumerate(panels):
-            vertical, horizontal = parameters[down], parameters[across]
-            if across > down:
-                panel.set_axis_off()
-                continue
-            panel.set_xlim(horizontal.low, horizontal.high)
-            if across == down:
-                kept = [row[horizontal.name] for row in fit]
-                panel.hist(kept, bins=BINS, range=(horizontal.low, horizontal.high), color=FIT)
-                panel.axhline(len(kept) / BINS, color="black", linewidth=0.8, linestyle=":")
-            else:
-                panel.set_ylim(vertical.low, vertical.high)
-                for some, colour, area in ((rows, PALE, 2), (fit, FIT, 6)):
-                    places = [[row[each.name] for row in some] for each in (horizontal, vertical)]
-                    panel.scatter(*places, s=area, color=colour, linewidths=0)
-            label = {"fontsize": medium().note, "parse_math": False}
-            panel.set_xlabel(_named(horizontal), **label)
-            panel.set_ylabel(_named(vertical) if down else "", **label)
-            panel.tick_params(labelsize=medium().note)
-            panel.label_outer()
-
-
-def _named(given: Range) -> str:
-    words = medium().wrap(given.words, SIDE)
-    return f"{words}\n[{given.unit}]" if given.unit else words
+from .look import Look, chart, grid, legend_below, medium
 
 
 def draw_map(path: Path, shares: pd.DataFrame, margins: pd.DataFrame, axis: str, looked: Mapping[str, Look]) -> None:

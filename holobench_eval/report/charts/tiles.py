@@ -145,17 +145,14 @@ class Thumbnails:
         scores = [self.results.headline, *(score for score in self.results.leading if score.metric == "ssim")][:most]
         return Tile(picture, noted(scores, cell))
 
-    def by_quality(self, condition: str) -> list[str]:
-        """The targets that have a picture, from worst to best by their mean over methods."""
-        results = self.results
-        values = pd.DataFrame([results.values(label, condition) for label in results.methods(condition)])
-        quality = dict(zip(results.targets, results.headline.sign * values.mean().fillna(0.0), strict=True))
-        return sorted(self.targets(condition), key=lambda target: quality[target])
-
-    def middle(self, condition: str) -> str:
-        """The target in the middle of ``by_quality``."""
-        ordered = self.by_quality(condition)
-        return ordered[len(ordered) // 2]
+    def typical(self, labels: Sequence[str], condition: str) -> list[str]:
+        """The targets with a picture of each of these methods, those of differences nearest to the mean first."""
+        known = self.targets(condition)
+        return [
+            target
+            for target in self.results.near
+            if target in known and all(self.tile(label, condition, target).picture is not None for label in labels)
+        ]
 
 
 def noted(scores: Sequence[Score], cell: pd.Series) -> str:

@@ -197,7 +197,7 @@ def _matrix(board: Board) -> Markdown | None:
     """A row a method, those of most displays and largest mean difference first, within their group."""
     results, score = board.results, board.results.headline
     groups = grouped((name, row) for display in board.displays for name, rows in display.groups for row in rows)
-    lines, known = list[dict[str, object]](), {(d.name, row.label): row for d in board.displays for row in d.rows}
+    lines, known = list[Mapping[str, object]](), {(d.name, row.label): row for d in board.displays for row in d.rows}
     for name, rows in groups.items():
         own = grouped((row.label, row.test.estimate.mean if row.test else 0.0) for row in rows)
         ranked = sorted(own, key=lambda label: (-len(own[label]), -score.sign * np.mean(own[label])))

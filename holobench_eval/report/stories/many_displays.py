@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ...study.calibration import value_of
-from ...study.calibration.family import load_family, names
+from ...display.simulated.origins import families, load_family, value_of
+from ...display.simulated.origins import parameters as ranges
 from ..board import Board
 from ..charts import paired
 from ..charts.family import draw_map
@@ -207,13 +207,12 @@ def missed(shares: pd.DataFrame, values: pd.DataFrame) -> pd.DataFrame:
 def parameters(results: Results) -> dict[str, Array]:
     """What differs between the displays of a family, ``(displays,)`` by words; empty where they are of none."""
     profiles = [results.facts.profiles[name] for name in shown_on(results) if name in results.facts.profiles]
-    family = next((name for name in names() if all(each.name.startswith(f"{name}-") for each in profiles)), None)
+    family = next((name for name in families() if all(each.name.startswith(f"{name}-") for each in profiles)), None)
     if family is None or len(profiles) < FEWEST_DISPLAYS:
         return {}
-    loaded = load_family(family)
     values = {
-        given.words: np.array([np.mean(value_of(profile, given.name)) for profile in profiles])
-        for given in (*loaded.parameters, *loaded.outside.parameters)
+        given["words"]: np.array([np.mean(value_of(profile, given["name"])) for profile in profiles])
+        for given in ranges(load_family(family))
     }
     return {name: column for name, column in values.items() if np.ptp(column) > 0}
 

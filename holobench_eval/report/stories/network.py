@@ -11,4 +11,4 @@ QUESTION = "How good are the pictures that the learned display predicts?"
 
 def applies(results: Results) -> bool:
     """Whether pictures are scored that a learned display predicts."""
-    return results.facts.network and results.study.measure == "picture"
+    return bool(results.facts.network) and results.study.measure == "picture"

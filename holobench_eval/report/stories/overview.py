@@ -5,19 +5,21 @@ report.md has the first page and the limits; details.md has the setup, the paire
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...core.errors import UserError
+from ...core.io import read_text
 from ...study.plan import is_reference
 from ..board import board
 from ..charts.tiles import draw_rows
 from ..facts import FLOOR
-from ..markdown import Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
+from ..markdown import REPORT, Markdown, beginning, bullets, code, code_block, heading, properties, table, table_of
 from ..phrases import edited, remarks, uncovered
-from ..results import DONE, Results
+from ..results import DONE, MOST_BYTES, Results
 from ..statistics import FEWEST, POWER, SIGNIFICANCE
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
 from ..text import FILES, grouped, plain, words
@@ -60,15 +62,19 @@ def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
     """A target, and its captures by the methods that are ``chosen``."""
     results, thumbnails, text = report.results, report.thumbnails, report.results.text
     for condition in [name for name in results.conditions if results.has_pictures(name)][:1]:
-        known = thumbnails.targets(condition)
-        target = thumbnails.middle(condition) if known else ""
-        labels = chosen(results, condition) if known else []
-        tiles = [(report.results.facts.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
-        if any(tile.picture is not None for _, tile in tiles):
-            middle = ", the target in the middle of the ranking by quality" if len(results.targets) > 1 else ""
-            which, path = f"{text.scored.capitalize()}s of {target}{middle}", report.figures / PICTURES
-            draw_rows(path, condition, (target, known[target]), [("", tiles)])
+        labels = chosen(results, condition)
+        for target in thumbnails.typical(labels, condition)[:1]:
+            tiles = [(results.facts.marked(label), thumbnails.tile(label, condition, target)) for label in labels]
+            typical = ", whose differences between methods are nearest to the mean" if len(results.targets) > 1 else ""
+            which, path = f"{text.scored.capitalize()}s of {target}{typical}", report.figures / PICTURES
+            draw_rows(path, condition, (target, thumbnails.targets(condition)[target]), [("", tiles)])
             yield path, f"{which}, on {condition}. {text.picture}. Left: the {text.truth}."
+
+
+def _typical(report: Report) -> Iterable[tuple[Path, str]]:
+    """The row of pictures, from the small copies where the records are not there; else that of an earlier report."""
+    drawn = [] if report.drawn else list(_pictures(report))
+    return drawn or report.pictures(PICTURES, lambda report: [])
 
 
 def chosen(results: Results, condition: str) -> list[str]:
@@ -85,6 +91,23 @@ def _stages(report: Report) -> Iterator[tuple[Path, str]]:
         path = report.figures / f"stages-{name}.png"
         if path.is_file():
             yield path, f"Stages of the simulated bench {name}."
+
+
+def _parts(report: Report, _: Figures) -> Blocks:
+    """The question of each part and the beginning of its answer, as its own report has them."""
+    yield heading("Parts")
+    run, lines = report.description.config_file or "CONFIG.yaml", list[Markdown]()
+    for name in report.results.study.parts:
+        try:
+            title, question, headed, answer = read_text(report.output / name / REPORT, MOST_BYTES).split("\n\n", 4)[:4]
+            if (title[:2], headed, answer[:2]) != ("# ", heading("Answer"), "- "):
+                raise ValueError
+            told = (Markdown(text) for text in (title[2:], question, answer[2:].partition("\n")[0]))
+            lines.append(Markdown("[{}]({}/{}). {} {}").format(next(told), name, REPORT, *told))
+        except (UserError, OSError, ValueError) as error:
+            command = f"holoeval {'run' if isinstance(error, FileNotFoundError) else 'report'} {run}/{name}"
+            lines.append(Markdown("{} has no report with an answer here: {} writes one.").format(name, code(command)))
+    yield bullets(lines)
 
 
 def _limits(report: Report, _: Figures) -> Blocks:
@@ -169,7 +192,8 @@ def _form(report: Report) -> Iterator[str]:
 
 
 def _tuned(report: Report) -> Iterator[str]:
-    same = grouped((text, label) for label, text in report.results.facts.methods["tuned"].dropna().items())
+    tuned = report.results.facts.methods["tuned"].dropna()
+    same = grouped((text, str(label)) for label, text in tuned.items())
     if parts := [f"of {words(labels)}, {text}" for text, labels in same.items()]:
         others = "The others have the settings of their papers, of this package or of the config."
         yield f"Tuned: {'; '.join(parts)}. {others}"
@@ -377,6 +401,10 @@ def environment(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*named, *((name, str(value)) for name, value in provenance.get("packages", {}).items())]
 
 
+def _has_parts(report: Report) -> bool:
+    return bool(report.results.study.parts) and not report.results.study.changes
+
+
 def _has_displays(report: Report) -> bool:
     return bool(report.results.conditions)
 
@@ -391,7 +419,8 @@ PARTS = (
     Part(2, _answer, applies=_has_displays),
     Part(3, _table, applies=_has_scores),
     Part(4, applies=_has_scores, figures=lambda report: report.once(_figures)[:1]),
-    Part(6, applies=_has_scores, figures=lambda report: report.pictures(PICTURES, _pictures)),
+    Part(6, applies=_has_scores, figures=_typical),
+    Part(74, _parts, applies=_has_parts),
     Part(75, _limits, applies=_has_displays),
     Part(210, _reproduce),
     Part(1, _details, details=True),

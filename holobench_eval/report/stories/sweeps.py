@@ -258,7 +258,7 @@ def table(board: Board) -> Markdown | None:
     score, lines = results.headline, dict[tuple[str, str], dict[str, object]]()
     labels = dict.fromkeys(label for _, _, label in sweeps(results))
     for (display, kind, label), points in sweeps(results).items():
-        line = {"change": KINDS[kind].words, "display": display} if several else {"change": KINDS[kind].words}
+        line: dict[str, object] = {"change": KINDS[kind].words, **({"display": display} if several else {})}
         row = lines.setdefault((display, kind), line | dict.fromkeys(labels, "–"))
         for worst, loss in _lost(points)[:1]:
             row[label] = f"{score.number(loss.mean)} at {worst.text}"
@@ -299,11 +299,12 @@ def figures(report: Report) -> Iterator[tuple[Path, str]]:
 
 
 def _pictures(report: Report) -> Iterator[tuple[Path, str]]:
-    """Rows of pictures of the target in the middle of their ranking by quality, a row a chosen method."""
+    """Rows of pictures of the target whose differences between methods are nearest to the mean, a row a method."""
     results, thumbnails, stems = report.results, report.thumbnails, slugs(report.results.conditions)
-    if not thumbnails.targets(results.conditions[0]):
+    known, swept = thumbnails.targets(results.conditions[0]), sweeps(results)
+    if not known:
         return
-    target, swept = thumbnails.middle(results.conditions[0]), sweeps(results)
+    target = next(name for name in results.near if name in known)
     for display, kind in dict.fromkeys((display, kind) for display, kind, _ in swept):
         ranked = results.ranking(display, categories=(*OFFLINE, ONLINE))
         rows = [

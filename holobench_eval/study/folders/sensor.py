@@ -9,6 +9,7 @@ import numpy as np
 
 from ...imaging.shared_pose import sampled
 from ...imaging.similarity import Mask
+from ...imaging.standing_out import hot_and_dead
 from ...imaging.warp import Frame, Warp
 from ...lab.photograph import MOST_SATURATED
 from .exposure import SAMPLED, area
@@ -21,9 +22,7 @@ SAME = 0.012  # of their value: levels of a target that are equal, as bright one
 NOISY = 0.03  # of its value, between neighbours that are equal in the target: then no part of a capture is even
 AROUND = np.ones((5, 5), np.uint8)  # as far as a blur takes light
 
-RING = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
-ALONE = 3.0  # times the spread of its neighbours, by which a pixel stands out: of full speckle one in 500 does
-STEP, LINE = 0.05, 0.01  # of the brightest thousandth: by which a pixel stands out, and a row by its median
+LINE = 0.01  # of the brightest thousandth, by which a row stands out by its median
 MOSAIC = 1.1  # between the means of every second row and column
 
 
@@ -106,8 +105,6 @@ def _mended(plane: Frame) -> Frame:
         over, under = here - np.maximum(before, after), np.minimum(before, after) - here
         odd = np.maximum(np.median(over, axis=1), np.median(under, axis=1)) > LINE * bright
         here[odd] = (before + after)[odd] / 2
-    highest, lowest = cv2.dilate(even, RING), cv2.erode(even, RING)
-    beyond = np.maximum(even - highest, lowest - even)
-    odd = (beyond > STEP * bright) & (beyond > ALONE * (highest - lowest))
+    odd = np.logical_or(*hot_and_dead(even))
     even[odd] = cv2.medianBlur(even, 3)[odd]
     return np.where(even == plane - dark, plane, even + dark)

@@ -116,7 +116,7 @@ def _basis(study: Study, plan: Plan, output: Path) -> dict[str, Any]:
     profiles = {name: {"version": display.version, "sha256": display.digest} for name, display in displays.items()}
     kind = "real" if study.display.real else "learned" if study.display.learned else "simulated"
     return {
-        "config": os.path.relpath(study.file, output),
+        "config": os.path.relpath(study.config, output),
         "config_sha256": text_digest(study.text),
         "board": study.board,
         "harness": HARNESS,

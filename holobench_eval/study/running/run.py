@@ -173,7 +173,7 @@ def _left(
     solves: bool,
 ) -> _Left:
     """What is left of a plan. metrics: versions of those that are wanted; solves: whether anything may be solved."""
-    phases, timed = phases_of(store.output, study.folder), cost.timed(study, plan)
+    phases, timed = phases_of(store.output, study.folder, study.part), cost.timed(study, plan)
     networks = artifacts.networks(plan.preparations().values())
     states = store.states(plan.cells, timed, metrics, study.folder, networks)
     again = ("missing", "untimed", *(("failed",) if retry_failed else ()))
@@ -255,7 +255,7 @@ def forget(study: Study, plan: Plan, store: Store, artifacts: Artifacts) -> None
     for preparation in plan.preparations().values():
         artifacts.remove(preparation)
     learned = [cell for cell in plan.cells if cell.prepared]
-    phases_of(store.output, study.folder).remove(cell.phase_id for cell in learned)
+    phases_of(store.output, study.folder, study.part).remove(cell.phase_id for cell in learned)
     store.remove(cell.id for cell in learned)
 
 

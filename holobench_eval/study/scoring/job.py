@@ -87,7 +87,7 @@ class Job:
     @property
     def phases(self) -> Phases:
         """Where phases are kept."""
-        return phases_of(self.setting.output, self.setting.study.folder)
+        return phases_of(self.setting.output, self.setting.study.folder, self.setting.study.part)
 
     @property
     def kind(self) -> tuple[str, str]:

@@ -72,7 +72,9 @@ def captured(job: Job, solved: Solution, cell: Cell, display: Condition, target:
         saturated=capture.saturated,
         learned=account(job.learned(job.task.preparation)),
         stopped=solved.stopped,
-        remark=phase_doubt(solved.phase, target, display.spec, traits.sees or traits.trains) if looked_at else "",
+        remark=phase_doubt(solved.phase, target, display.spec, traits.sees or traits.trains, traits.timed)
+        if looked_at
+        else "",
         reads=solved.covered,
         uncovered=solved.uncovered,
         **asdict(solved.cost) if traits.timed else {},

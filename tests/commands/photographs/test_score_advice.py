@@ -1,7 +1,5 @@
 """What ``holoeval score`` and its report say of methods that lack targets, and of how to rank them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,11 +10,11 @@ from holobench_eval.report.stories import answer
 from holobench_eval.report.stories.comparison import lacking
 from holobench_eval.study.folders import FILES
 from holobench_eval.study.folders.pairing import UNKNOWN
-from tests.support.synthetic_study import cell, layout, record, study
+from tests.support.synthetic_study import cell, facts, record, study
 
 
 def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
-    records, given = study(tmp_path, size=24), layout(measure=FILES)
+    records, given = study(tmp_path, size=24), facts(measure=FILES)
     one = lacking(Results(records_frame(records, given), given))  # GS lacks coffee on a display
     assert one.startswith("Only the 11 methods that have every target are ranked: GS on leto-aged lacks 1 of 6 targets")
     first = records[0]["cell"]["target"]
@@ -31,8 +29,8 @@ def test_a_way_to_a_ranking_is_told_where_no_method_has_every_target(tmp_path):
 def holed(*holes: tuple[str, str, str, str]) -> Results:
     """Methods a to c with scores of four targets, but for holes: state, method, target, reason."""
     targets = ("t0", "t1", "t2", "t3")
-    given = layout(pairs=tuple((m, "d") for m in "abc"), targets=targets, privileged=frozenset(), reported={})
-    given = replace(given, baseline=None, measure=FILES, values="linear")
+    pairs, alone = tuple((m, "d") for m in "abc"), {"privileged": (), "reported": {}, "baseline": None}
+    given = facts(pairs=pairs, targets=targets, measure=FILES, values="linear", **alone)
     lost = {(method, target): {"state": state, "reason": reason} for state, method, target, reason in holes}
     records = [
         one | lost.get((method, target), {}) | ({"scores": {}} if (method, target) in lost else {})

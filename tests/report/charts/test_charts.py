@@ -99,7 +99,7 @@ def test_every_row_but_the_oracle_has_a_mark_a_name_and_its_place(found, drawn, 
     displays = board(found).displays
     curves.draw_costs(tmp_path / "x.png", displays, found.names, look.looks(found.names), "PSNR [dB]")
     for axes, display in zip(drawn[0].axes, displays, strict=True):
-        rows = [row for row in display.rows if row.label not in found.oracles]
+        rows = [row for row in display.rows if row.label not in found.facts.oracles]
         assert {text.get_text() for text in axes.get_legend().get_texts()} == {row.label for row in rows}
         places = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1}
         assert {(row.photographs, row.score.mean) for row in rows} <= places

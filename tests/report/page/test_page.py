@@ -40,11 +40,10 @@ def test_names_from_files_open_no_element(written: Written, elements: Elements) 
     assert HOSTILE in written.data["methods"]  # in the data, a name is the same text
 
 
-@pytest.mark.parametrize("text", ["</script>", "<!--", "a & b", "\u2028\u2029", "]]>"])
-def test_json_holds_no_character_that_ends_a_script_and_reads_back(text: str) -> None:
-    written = json_text({"name": text})
-    assert not re.search("[<>&\u2028\u2029]", written)
-    assert json.loads(written) == {"name": text}
+def test_json_holds_no_character_that_ends_a_script_and_reads_back() -> None:
+    names = ["</script>", "<!--", "a & b", "\u2028\u2029", "]]>"]
+    assert not re.search("[<>&\u2028\u2029]", json_text(names))
+    assert json.loads(json_text(names)) == names
 
 
 def test_every_element_that_loads_something_has_it_within_and_the_page_is_small(written, elements) -> None:

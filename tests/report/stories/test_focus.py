@@ -55,7 +55,7 @@ def test_views_have_a_column_a_place_and_one_hologram_a_scene() -> None:
 
 def test_scores_in_focus_are_named_so_and_lead_the_tables_which_other_studies_lack() -> None:
     assert story_of(results_of({"lens": 20.0})) is story
-    assert story_of(results_of({"lens": 20.0}, planes={})) is not story
+    assert story_of(results_of({"lens": 20.0}, measure="picture")) is not story
     assert parse("psnr_linear_infocus").axis == "PSNR in focus, linear light [dB]"
     leading = [score.key for score in results_of({"lens": 20.0}).leading]
     assert leading[:3] == ["psnr_linear_infocus", "ssim_linear_infocus", "psnr_linear"]

@@ -166,7 +166,7 @@ def test_the_answer_names_what_to_measure_where_it_pays() -> None:
     assert "predict margins on displays left out: R2 1.00 of new." in text
 
 
-def test_the_report_reads_its_related_studies_beside_it(tmp_path: Path) -> None:
+def test_the_report_reads_the_parts_that_predict_in_its_folder(tmp_path: Path) -> None:
     other = budget()
     (tmp_path / "budget").mkdir()
     write_texts(other, tmp_path / "budget")

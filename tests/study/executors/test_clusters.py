@@ -20,6 +20,7 @@ from holobench_eval.study.executors import Serial, clusters
 from holobench_eval.study.executors.clusters import Address, Slurm
 from holobench_eval.study.running import run as running
 from tests.study.executors.test_executors import compute, untimed
+from tests.support.patience import PATIENCE
 from tests.support.studies.fake_study import fake_work, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
@@ -82,7 +83,7 @@ SEEN = threading.Event()
 
 
 def until_seen(_: object) -> None:
-    SEEN.wait()
+    SEEN.wait(PATIENCE)
 
 
 @pytest.mark.parametrize("waiting", [False, True], ids=["with a job", "before its first job"])

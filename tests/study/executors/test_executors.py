@@ -117,7 +117,7 @@ def test_workers_end_with_their_run(tmp_path, ending):
         interrupting.start()
         with pytest.raises(KeyboardInterrupt):
             run_of_two(tmp_path)
-        interrupting.join()
+        interrupting.join(PATIENCE)
     wait_until(lambda: not any(Path("/proc", worker.name).exists() for worker in tmp_path.iterdir()))
 
 

@@ -11,6 +11,7 @@ from holobench_eval.study.phases import RESULTS, Phases
 from tests.study.studies import TURNS
 from tests.study.studies import compute as compute_with
 from tests.support import plugins
+from tests.support.patience import PATIENCE
 from tests.support.studies.trained_study import compute, needs, write
 
 READING = plugins.text("reading")
@@ -118,7 +119,7 @@ def test_a_phase_is_solved_by_one_at_a_time(tmp_path):
         waiting.start()
         waiting.join(0.2)
         order.append("first")
-    waiting.join()
+    waiting.join(PATIENCE)
     assert order == ["first", "second"]
 
 

@@ -2,6 +2,8 @@
 
 import hashlib
 import os
+import sys
+from importlib.util import cache_from_source
 from multiprocessing import Pipe
 from pathlib import Path
 
@@ -115,6 +117,15 @@ def test_a_file_that_came_changed_or_went_is_named_and_its_time_is_no_matter(tmp
     assert isolation.changed(covered, tmp_path) == "a.txt"
     first.unlink()
     assert isolation.changed(covered, tmp_path) == "a.txt"
+
+
+@pytest.mark.parametrize("prefix", [None, "/cache"])
+def test_a_compiled_file_that_is_read_is_its_source(tmp_path, monkeypatch, prefix):
+    monkeypatch.setattr(sys, "pycache_prefix", prefix)
+    source, seen = tmp_path / "a.py", Seen()
+    source.touch()
+    seen.note(cache_from_source(str(source)))
+    assert list(seen.read) == [str(source)]
 
 
 FILES = [[], {"a": (1, 2)}, {"a": 1.5}, {1.5: None}]

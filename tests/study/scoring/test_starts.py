@@ -23,7 +23,7 @@ from holobench_eval.study.scoring import starts
 from holobench_eval.study.store import Store
 from tests.study import studies
 from tests.study.studies import add_other_profile, planned
-from tests.support.patience import killed_at
+from tests.support.patience import PATIENCE, killed_at
 from tests.support.studies.fake_study import fake_work, held, installed, solves, untimed, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_physics")]
@@ -193,7 +193,7 @@ def test_a_start_that_another_machine_has_just_written_is_waited_for_until_it_is
     writer = Timer(0.3, hidden.rename, (late,))
     writer.start()
     after = starts_of(store, follower)
-    writer.join()
+    writer.join(PATIENCE)
     assert torch.equal(torch.stack(after), torch.stack(before))
     monkeypatch.setattr(storing, "LATE", 0.0)
     late.unlink()

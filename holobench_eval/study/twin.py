@@ -3,45 +3,46 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import torch
 import yaml
 from torch import Tensor
 
-from ...core.errors import CellError, UserError
-from ...core.installed import shipped_configs
-from ...core.io import file_name, write_atomically
-from ...core.yaml_source import load
-from ...display import Profile, load_profile
-from ...display.simulated.maps import load_maps
-from ...display.simulated.profile import STAGES
-from ...display.simulated.stages import Sensor
-from ...lab.bench_file import load_bench_file
-from ...lab.session import read_manifest
-from ...methods.files.arrays import read_array
-from ...methods.twin.method import learned_twin
-from ...methods.twin.to_profile import to_profile, write_profile
-from ...metrics import match
-from ..artifacts import Artifact, Artifacts
-from ..config import load_study
-from ..definition import MethodEntry, Study
-from ..displays import Condition, displays
-from ..folders.session import ARTIFACTS, REPORT, study_of
-from ..isolation import traits
-from ..network_display import predictor, write_network
-from ..opening import open_bench
-from ..plan import Cell, Plan, plan
-from ..scoring.scores import kept_capture
-from ..store import Store
+from ..core.device import CPU
+from ..core.errors import CellError, UserError
+from ..core.installed import shipped_configs
+from ..core.io import file_name
+from ..core.yaml_source import load
+from ..display import CalibratedBench, Profile, load_profile
+from ..display.learned import LearnedBench
+from ..display.simulated.profile import STAGES
+from ..display.simulated.stages import Sensor
+from ..lab.bench_file import load_bench_file
+from ..lab.session import read_manifest
+from ..lab.session.manifest import FILE as MANIFEST
+from ..methods.files.arrays import read_array
+from ..methods.twin.method import learned_twin
+from ..methods.twin.to_profile import to_profile, write_profile
+from ..metrics import match
+from .artifacts import Artifact, Artifacts
+from .config import load_study
+from .definition import MethodEntry, Study
+from .displays import Condition, displays
+from .folders.session import ARTIFACTS, REPORT, study_of
+from .isolation import traits
+from .network_display import network_bench, predictor, write_network
+from .opening import open_bench
+from .plan import Cell, Plan, plan
+from .scoring.picture import refuse_saturated
+from .scoring.scores import kept_capture
+from .store import Store
 
-WORK = "work"  # in the folder of a twin: two studies, a config and a report each, and the displays of the trial
+WORK = "work"  # in the folder of a twin: the study of the photographs, and the displays of the trial
 PHOTOGRAPHS, TRIAL = "photographs", "trial"
-TURNED, BLANK = "turned", "blank"  # displays that a twin has to be better than
 OVER_PANEL = ("lut.gain", "illumination.amplitude", "illumination.phase")
 NOISY = 2  # pictures of each method, which tell the noise of a camera
 SCORE = "psnr_linear"
@@ -95,11 +96,6 @@ class Photographed:
         """Its plan."""
         return plan(self.study)
 
-    @property
-    def store(self) -> Store:
-        """Its records."""
-        return Store(self.output)
-
     @cached_property
     def display(self) -> Condition:
         """Its one display. UserError: it has several."""
@@ -121,27 +117,19 @@ class Photographed:
             raise UserError(f"{self.study.file}: {len(rows)} methods learn the display; expected one, such as twin")
         return rows[0]
 
-    @property
-    def label(self) -> str:
-        """Of ``row``."""
-        return self.row.label
-
-    def cells(self) -> dict[str, dict[tuple[str, str], list[Cell]]]:
-        """The cells of methods by display, and by label and target, in the order of repeats."""
-        found: dict[str, dict[tuple[str, str], list[Cell]]] = {}
-        for label, cell in self.plan.labelled():
-            if cell.code:
-                found.setdefault(cell.condition, {}).setdefault((label, cell.target), []).append(cell)
-        return found
-
     @cached_property
     def own(self) -> dict[tuple[str, str], list[Cell]]:
-        """``cells`` of its one display."""
-        return self.cells()[self.display.name]
+        """The cells of methods by label and target, in the order of repeats."""
+        found: dict[tuple[str, str], list[Cell]] = {}
+        for label, cell in self.plan.labelled():
+            if cell.code:
+                found.setdefault((label, cell.target), []).append(cell)
+        return found
 
     def captures(self, cell: Cell) -> tuple[Tensor, float]:
         """The kept capture ``(C, h, w)`` of a cell, and its PSNR [dB]. UserError: it was not taken, or is damaged."""
-        record, kept = self.store.read(cell.id), kept_capture(self.store.capture(cell.id))
+        store = Store(self.output)
+        record, kept = store.read(cell.id), kept_capture(store.capture(cell.id))
         if record is None or record.state != "done" or not kept:
             state = "waits for its photograph" if record is None else record.reason or "has lost its capture"
             raise UserError(f"{self.output}: {cell.method} on {cell.target} {state}; a twin needs every cell")
@@ -174,43 +162,44 @@ class Photographed:
 
     def phase(self, label: str, item: str, repeat: int = 0) -> Tensor:
         """A hologram ``(C, H, W)`` [rad] that the study has saved. UserError: it has not."""
-        path = self.phases(label) / f"{file_name(item)}{f'-{repeat}' * (repeat > 0)}.npy"
+        folder = self.output / "phases" / file_name(label) / file_name(self.display.name)
+        path = folder / f"{file_name(item)}{f'-{repeat}' * (repeat > 0)}.npy"
         if not path.is_file():
             raise UserError(f"{path}: no such hologram; a twin needs 'save: {{phases: true}}'")
         return torch.from_numpy(read_array(path))
 
-    def phases(self, label: str) -> Path:
-        """Where the holograms of a method are."""
-        return (self.output / "phases" / file_name(label) / file_name(self.display.name)).resolve()
-
     @cached_property
     def learned(self) -> Artifact:
         """What the row of the twin has learned. UserError: it was not trained."""
-        wanted = next(task.preparation for task in self.plan.tasks if task.label == self.label)
-        assert wanted is not None
-        artifacts = Artifacts(self.artifacts)
+        label, artifacts = self.row.label, Artifacts(self.artifacts)
+        wanted = next(task.preparation for task in self.plan.tasks if task.label == label and task.preparation)
         if not artifacts.has(wanted):
-            lacks = f"has no trained {self.label}: {artifacts.failure(wanted)}"
+            lacks = f"has no trained {label}: {artifacts.failure(wanted)}"
             raise UserError(f"{artifacts.folder}: {lacks}; give its --artifacts or --retrain")
         return artifacts.load(wanted)
 
 
 def of_session(folder: Path) -> Photographed:
     """The study of a session's folder. UserError as ``study_of``, and for photographs that are not taken yet."""
+    if not (folder / MANIFEST).is_file():
+        own = folder / f"{folder.resolve().name}.yaml"
+        hint = f"; the twin there is {own}" * own.is_file()
+        raise UserError(f"{folder}: a folder without {MANIFEST}; give that of a session, or a display{hint}")
     try:
         study = study_of(folder, read_manifest(folder), None)
     except UserError as error:
         told = str(error).partition("; give --study")[0]
         raise UserError(f"{told}; a twin is learned from a session of the config 'twin'") from None
     found = Photographed(study, folder / REPORT, folder / ARTIFACTS)
-    if any(found.store.read(cell.id) is None for cell in found.plan.cells):
+    if any(Store(found.output).read(cell.id) is None for cell in found.plan.cells):
         raise UserError(f"{folder}: photographs are missing; holoeval session import {folder} says which")
     return found
 
 
-def in_folder(folder: Path, artifacts: Path, name: str = PHOTOGRAPHS) -> Photographed:
-    """The study of that name in the folder of a twin."""
-    return Photographed(load_study(folder / WORK / f"{name}.yaml"), folder / WORK / name, artifacts)
+def in_folder(folder: Path, artifacts: Path) -> Photographed:
+    """The study of the photographs in the folder of a twin."""
+    work = folder / WORK
+    return Photographed(load_study(work / f"{PHOTOGRAPHS}.yaml"), work / PHOTOGRAPHS, artifacts)
 
 
 def refuse(name: str, photographed: Photographed, folder: Path) -> None:
@@ -239,52 +228,65 @@ def nominal(name: str, photographed: Photographed) -> Profile:
     return Profile(name, 1, 0, words, panel=panel, residual_bound=bound)
 
 
-def write_trial(photographed: Photographed, name: str, folder: Path) -> Profile:
-    """Write the twin as a profile, two that it has to be better than, and the study of all three.
+def write_trial(photographed: Photographed, name: str, folder: Path) -> list[Profile]:
+    """Write the twin as a profile, and two that it has to be better than; of a network there are none.
 
     Of ``turned`` the maps over the panel are turned by half a turn, ``blank`` has no maps. The camera's noise is that
-    of two photographs. Returns the profile of the twin, whose maps are beside it. UserError: it cannot be registered.
+    of two photographs. UserError: the twin cannot be registered.
     """
     for kind, found in zip(("methods", "pictures"), map(set, zip(*photographed.own, strict=True)), strict=True):
         if len(found) < FEWEST:
             raise UserError(f"{photographed.study.file}: {len(found)} {kind}; a twin is tried on {FEWEST} or more")
-    trial, row = folder / WORK / TRIAL, photographed.row
+    trial, row, display = folder / WORK / TRIAL, photographed.row, photographed.display
     base = nominal(name, photographed)
-    config, names = folder / WORK / f"{TRIAL}.yaml", trial_names(name, photographed)
-    write_atomically(config, _trial_text(photographed, names).encode())
     if row.name != "twin":
-        state, of = photographed.learned.state, photographed.display.name
-        base = replace(base, description=f"What {row.name} has learned of {of} from photographs; without noise.")
-        return load_profile(str(write_network(state, row.name, row.params, base, trial)))
-    model, camera = learned_twin(photographed.learned.state, photographed.display.spec)
+        words = f"What {row.name} has learned of {display.name} from photographs; without noise."
+        base = replace(base, description=words)
+        return [load_profile(str(write_network(photographed.learned.state, row.name, row.params, base, trial)))]
+    model, camera = learned_twin(photographed.learned.state, display.spec)
     untried = load_profile(str(to_profile(model, camera, base, trial)))
     base = replace(base, sensor=_camera(photographed, untried))
-    profile = load_profile(str(to_profile(model, camera, base, trial)))
-    held = load_maps(profile.maps, trial, _sizes(profile))
-    turned = {key: values.flip(-2, -1) if key in OVER_PANEL else values for key, values in held.items()}
-    for other, maps in zip(names[1:], (turned, {}), strict=True):
-        write_profile(maps, replace(base, name=other), trial)
-    return profile
+    twin = load_profile(str(to_profile(model, camera, base, trial)))
+    turned = {key: each.flip(-2, -1) if key in OVER_PANEL else each for key, each in _maps(twin).items()}
+    others = {"turned": turned, "blank": {}}
+    paths = [write_profile(maps, replace(base, name=f"{name}-{key}"), trial) for key, maps in others.items()]
+    return [twin, *(load_profile(str(path)) for path in paths)]
 
 
-def _sizes(profile: Profile) -> dict[str, int]:
-    rows, columns = profile.panel.shape
-    colours, levels = len(profile.panel.wavelengths), 2**profile.panel.bits
-    return {"colours": colours, "levels": levels, "rows": rows, "columns": columns}
+def opened(photographed: Photographed, profile: Profile, device: torch.device = CPU) -> CalibratedBench | LearnedBench:
+    """A display of the trial."""
+    seed = photographed.study.seed
+    if profile.network.method:
+        return network_bench(profile, seed, device)
+    return open_bench(profile, seed=seed, device=device)
+
+
+def captured(
+    photographed: Photographed, bench: CalibratedBench | LearnedBench, label: str, item: str, repeat: int = 0
+) -> Tensor:
+    """The capture ``(C, h, w)`` of a hologram on a display of the trial. UserError: it cannot be registered, or is
+    saturated."""
+    try:
+        capture = bench.photograph(photographed.phase(label, item), photographed.target(item), item, repeat)
+        refuse_saturated(capture)
+    except CellError as error:
+        raise UserError(f"'{bench.spec.name}': too far from its display to be photographed: {error}") from None
+    return capture.image.cpu()
+
+
+def _maps(profile: Profile) -> dict[str, Tensor]:
+    """What its stages hold, by ``maps.KEYS``."""
+    return {key: getattr(profile, stage).maps[name] for key in profile.held for stage, name in [key.split(".")]}
 
 
 def _camera(photographed: Photographed, profile: Profile) -> Sensor:
     """The camera of a profile, whose well and read noise are such that two captures differ as two photographs do."""
     seen = simulated = 0.0
-    bench = open_bench(profile, seed=photographed.study.seed)
-    try:
-        _ = bench.registration
-    except CellError as error:
-        raise UserError(f"'{profile.name}': the twin is too far from its display to be photographed: {error}") from None
+    bench = opened(photographed, profile)
     pictures = list(dict.fromkeys(item for _, item in photographed.twice))[:NOISY]
     for label, item in (pair for pair in photographed.twice if pair[1] in pictures):
-        target, phase = photographed.target(item), photographed.phase(label, item)
-        simulated += _difference([bench.photograph(phase, target, item, again).image for again in (0, 1)], target)
+        target = photographed.target(item)
+        simulated += _difference([captured(photographed, bench, label, item, repeat) for repeat in (0, 1)], target)
         seen += _difference(photographed.pair(label, item), target)
     ratio = simulated / max(seen, 1e-12)
     sensor = profile.sensor
@@ -298,44 +300,19 @@ def _difference(captures: Sequence[Tensor], target: Tensor) -> float:
     return float((first - second).square().mean())
 
 
-def _trial_text(photographed: Photographed, names: Sequence[str]) -> str:
-    """The config that shows the holograms of a display on its twin."""
-    study = photographed.study
-    rows: list[Mapping[str, Any]] = [
-        {"name": "phases", "label": label, "params": {"file": str(photographed.phases(label) / "{target}.npy")}}
-        for label in study.labels
-    ]
-    config = {
-        "title": f"{photographed.display.name} on its twin",
-        "seed": study.seed,
-        "display": {"profiles": [f"{TRIAL}/{file_name(each)}.yaml" for each in names]},
-        "targets": {"dataset": study.targets.dataset, "params": dict(study.targets.params)},
-        "methods": rows,
-        "protocol": {"metrics": ["psnr", "ssim"]},
-        "baseline": study.baseline,
-    }
-    return yaml.safe_dump(config, sort_keys=False)
-
-
-def trial_names(name: str, photographed: Photographed) -> list[str]:
-    """The displays of a trial: the twin, and those that it has to be better than; a network has none."""
-    return [name, *(f"{name}-{other}" for other in (TURNED, BLANK) if photographed.row.name == "twin")]
-
-
 def publish(profile: Profile, photographed: Photographed, folder: Path) -> Path:
     """Write the twin with what is known of it; the first of its version, or the next where another was written before.
 
     profile: of the trial, whose maps or network it has.
     """
-    write: Callable[[Profile, Path], Path] = (
-        partial(write_profile, load_maps(profile.maps, folder / WORK / TRIAL, _sizes(profile)))
-        if profile.network.method is None
-        else partial(write_network, photographed.learned.state, profile.network.method, profile.network.params)
-    )
     path = folder / f"{file_name(profile.name)}.yaml"
     before = load(path).data if path.is_file() else {}
     version = before["version"] if isinstance(before.get("version"), int) else 0
-    write(replace(profile, version=max(1, version)), folder)
-    if before and load(path).data != before:
-        write(replace(profile, version=version + 1), folder)
+    for known in (replace(profile, version=max(1, version)), replace(profile, version=version + 1)):
+        if known.network.method:
+            write_network(photographed.learned.state, known.network.method, known.network.params, known, folder)
+        else:
+            write_profile(_maps(profile), known, folder)
+        if not before or load(path).data == before:
+            break
     return path
