@@ -83,10 +83,10 @@ def _row(record: Record, facts: Facts) -> dict[str, Any]:
         "target": cell["target"],
         "cluster": facts.targets["cluster"].get(cell["target"], cell["target"]),
         "state": record["state"],
-        "reason": record.get("reason", ""),
+        "reason": _one_line(record.get("reason", "")),
         "learned_sha256": learned.get("sha256", "") if is_done else "",
-        "stop_reason": record.get("stopped", ""),
-        "phase_remark": record.get("remark", ""),
+        "stop_reason": _one_line(record.get("stopped", "")),
+        "phase_remark": _one_line(record.get("remark", "")),
         "fell_back": "yes" if learned.get("fell_back") else "",
         "cell": record["id"],
         "exposure": cell.get("exposure", ""),
@@ -111,8 +111,11 @@ def _row(record: Record, facts: Facts) -> dict[str, Any]:
     values = {parse(key).column: value for key, value in scores.items()}
     if clash := [name for name in RECORDED if name in values]:
         raise UserError(f"record {record['id']}: score named like a column of records.csv: {', '.join(clash)}")
-    plain = {name: " ".join(str(text).split()) for name, text in texts.items()}
-    return plain | {name: rounded(value) for name, value in (numbers | values).items()}
+    return texts | {name: rounded(value) for name, value in (numbers | values).items()}
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _is_kept(column: Column, frame: pd.DataFrame, facts: Facts) -> bool:

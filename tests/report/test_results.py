@@ -312,6 +312,7 @@ def test_a_report_from_records_csv_has_the_same_bytes_and_keeps_its_pictures(tmp
     assert after.keys() == before.keys()
     assert after["details.md"].decode() == before["details.md"].decode()
     changed = [name for name in before if before[name] != after[name]]
+    assert after["report.md"].decode() == before["report.md"].decode()
     assert changed == ["report.html"]  # which held the pictures of the records
 
 

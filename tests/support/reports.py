@@ -18,5 +18,6 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def write_texts(results: Results, folder: Path) -> None:
     """Write the files of data of a report."""
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts(results).items():
         (folder / name).write_text(text)
