@@ -7,6 +7,7 @@ out of place.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,9 +33,11 @@ from .charts.look import looks
 from .charts.twin import draw_twin_pictures, draw_twin_scores
 from .markdown import Markdown, blocks, bullets, code, heading, table_of
 from .statistics import Array, Estimate, mean_interval
-from .stories.training import Training, estimates, quantities
+from .stories.training import Training, estimates
+from .text import grouped
 
 COLOURS = ("red", "green", "blue")
+HEADERS = {None: "all", **dict(enumerate(COLOURS))}  # of columns of quantities
 PICTURES, SCORES = "pictures.jpg", "scores.png"
 DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
 AREA = (-2, -1)
@@ -317,3 +320,28 @@ def _draw(folder: Path, photographed: Photographed, found: Trial) -> None:
     scores = found.frame["score"]
     display, twin, *others = ({key: scores[name, key] for key in scores[name]} for name in (found.of, *found.twins))
     draw_twin_scores(folder / SCORES, display, twin, looks(names), others)
+
+
+def quantities(rows: Sequence[Mapping[str, Any]]) -> Markdown | None:
+    """A row for every quantity, a column for every colour: the estimate and, in brackets, the truth; of what no capture
+    shows, neither."""
+    colours: list[int | None] = sorted({row["colour"] for row in rows if row["colour"] is not None})
+    if colours == [0]:  # of the only laser
+        rows, colours = [{**row, "colour": None} for row in rows], []
+    if any(row["colour"] is None for row in rows):
+        colours.append(None)
+    has_truth, lines = any(not math.isnan(row["truth"]) for row in rows), []
+    for name, same in grouped((row["name"], row) for row in rows).items():
+        first, cells, off = same[0], dict.fromkeys(colours, ""), [-1.0]
+        for row in same:
+            truth = "–" if math.isnan(row["truth"]) else f"{row['truth']:.3f}"
+            seen = row.get("seen") is not False
+            cells[row["colour"]] = f"{row['value']:.3f}{f' ({truth})' * has_truth}" if seen else "–"
+            off += [row["apart"]] * (seen and not math.isnan(row["apart"]))
+        line = {"quantity": QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")}
+        line |= {"unit": first["unit"] or ""}
+        line |= {HEADERS.get(colour, f"colour {colour}"): cell for colour, cell in cells.items()}
+        line["largest difference"] = f"{max(off):.3f}" if off[1:] else "–"
+        stated = "–" if math.isnan(first["error"]) else f"{first['error']:.2g}"
+        lines.append(line | {"stated error": "not seen" if first.get("seen") is False else stated})
+    return table_of(lines)
