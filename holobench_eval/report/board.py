@@ -156,8 +156,8 @@ def board(results: Results) -> Board:
 def groups_of(results: Results) -> dict[str, str]:
     """The group of each method, by its label, in the order of the board: who was given as much of the camera, and shows
     as many frames in an exposure, which take as many times the panel's time."""
-    known = "frames" in results.frame
-    frames: dict[str, float] = results.frame.groupby("label")["frames"].max().to_dict() if known else {}
+    known = results.frame.groupby("label")["frames"].max() if "frames" in results.frame else pd.Series(dtype=float)
+    frames = {str(label): float(count) for label, count in known.items()}
     several = {label: frames.get(label, 1) > 1 for label, name in results.cells if not is_reference(name)}
     return {
         label: f"{name}{SEVERAL * more}"

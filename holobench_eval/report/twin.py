@@ -37,7 +37,6 @@ from .stories.training import Training, estimates
 from .text import grouped
 
 COLOURS = ("red", "green", "blue")
-HEADERS = {None: "all", **dict(enumerate(COLOURS))}  # of columns of quantities
 PICTURES, SCORES = "pictures.jpg", "scores.png"
 DARKEST = 1e-9  # mean square that no difference falls below, where a display has no noise
 AREA = (-2, -1)
@@ -340,8 +339,12 @@ def quantities(rows: Sequence[Mapping[str, Any]]) -> Markdown | None:
             off += [row["apart"]] * (seen and not math.isnan(row["apart"]))
         line = {"quantity": QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")}
         line |= {"unit": first["unit"] or ""}
-        line |= {HEADERS.get(colour, f"colour {colour}"): cell for colour, cell in cells.items()}
+        line |= {_colour(colour): cell for colour, cell in cells.items()}
         line["largest difference"] = f"{max(off):.3f}" if off[1:] else "–"
         stated = "–" if math.isnan(first["error"]) else f"{first['error']:.2g}"
         lines.append(line | {"stated error": "not seen" if first.get("seen") is False else stated})
     return table_of(lines)
+
+
+def _colour(colour: int | None) -> str:
+    return "all" if colour is None else dict(enumerate(COLOURS)).get(colour, f"colour {colour}")
