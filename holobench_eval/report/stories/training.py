@@ -122,9 +122,7 @@ def _estimated(learned: Sequence[Training]) -> Iterator[str]:
     """How many quantities of a display each model estimates as well as it states, and what it cannot represent."""
     known = ((each.labels, (each, rows)) for each in learned if (rows := list(estimates(each))))
     for labels, same in grouped(known).items():
-        each = [
-            f"{within(rows)} on {t.display} ({len(t.fact('missing', list, []))} effects unknown)" for t, rows in same
-        ]
+        each = [f"{within(rows)} on {training.display}" for training, rows in same]
         yield f"Within their stated errors, of what {words(list(labels))} estimates: {', '.join(each)}."
 
 
