@@ -11,7 +11,17 @@ REPORTS = sorted(path.parent for path in (ROOT / "reports").glob("**/board.json"
 SEED = 0.03  # dB: what another seed, or another run of a descent, moves a mean by
 MOST_LINES = 80
 MOST_WORDS = 40
-SAME = ["measure", "method", "parameters", "condition", "panel", "capture_limit", "learned_sha256", "targets"]
+SAME = [
+    "measure",
+    "method",
+    "parameters",
+    "condition",
+    "panel",
+    "capture_limit",
+    "learned_sha256",
+    "targets",
+    "exposure",
+]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +35,9 @@ def rows() -> pd.DataFrame:
             targets=("target", lambda names: " ".join(sorted(set(names)))),
             panel=("panel_height_px", "first"),
             capture_limit=("capture_limit", "first"),
+            exposure=("exposure", "first"),
         )
+        table = table.reindex(columns=[*{*table.columns} & {*SAME, "label", "category", "psnr_linear_db"}])
         merged = table.merge(facts.reset_index(), on=["label", "condition"]).assign(report=str(folder))
         frames.append(merged.reindex(columns=[*SAME, "label", "report", "category", "psnr_linear_db"]))
     whole = pd.concat(frames, ignore_index=True)

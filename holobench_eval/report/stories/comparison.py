@@ -25,7 +25,7 @@ QUESTION = "Which method gives the better picture, and by how much?"
 NAMED = 3  # methods of one letter
 LISTED = 10  # methods, or targets of all of them
 LISTED_EACH = 3  # targets of a method
-MOST_ROWS = 30  # of boards, one below the other
+MOST_DISPLAYS, MOST_ROWS = 2, 30  # of boards, one below the other
 ASKS = re.compile(r"^(Does|Do|Is|Are)\b.*\b(better|gains?|beats?)\b")
 CONTROL = "Control: the share of what a change of the hologram does to its capture that a model foresees (0 to 1)."
 EFFECTS = {  # in words, of a method and of several
@@ -158,10 +158,12 @@ def published(results: Results, label: str, condition: str) -> float | None:
 
 def table(board: Board) -> Markdown | None:
     """The board of each display; of more rows than a reader takes in, a row a method and a column a display."""
-    count = sum(len(display.rows) for display in board.displays)
-    drawn = boards(board) if count <= MOST_ROWS else [_matrix(board)]
-    star = "*: no better than gray." if count > MOST_ROWS else None
-    return blocks([*drawn, star, legend(board)]) if board.displays else None
+    drawn = [_matrix(board), "*: no better than gray."] if _is_large(board) else boards(board)
+    return blocks([*drawn, legend(board)]) if board.displays else None
+
+
+def _is_large(board: Board) -> bool:
+    return len(board.displays) > MOST_DISPLAYS or sum(len(display.rows) for display in board.displays) > MOST_ROWS
 
 
 def boards(board: Board) -> list[object]:
@@ -320,8 +322,7 @@ def _boards(report: Report, _: Figures) -> Blocks:
 
 
 def _has_matrix(report: Report) -> bool:
-    shown = board(report.results).displays
-    return not is_many(report.results) and sum(len(display.rows) for display in shown) > MOST_ROWS
+    return not is_many(report.results) and _is_large(board(report.results))
 
 
 PARTS = (Part(8, _boards, applies=_has_matrix, details=True),)
