@@ -158,8 +158,8 @@ def published(results: Results, label: str, condition: str) -> float | None:
 
 def table(board: Board) -> Markdown | None:
     """The board of each display; of more rows than a reader takes in, a row a method and a column a display."""
-    drawn = [_matrix(board), "*: no better than gray."] if _is_large(board) else boards(board)
-    return blocks([*drawn, legend(board)]) if board.displays else None
+    drawn = [_matrix(board)] if _is_large(board) else boards(board)
+    return blocks([*drawn, legend(board, lettered=not _is_large(board))]) if board.displays else None
 
 
 def _is_large(board: Board) -> bool:
@@ -180,19 +180,22 @@ def boards(board: Board) -> list[object]:
     return parts
 
 
-def legend(board: Board) -> str:
-    """What letters, marks and brackets of a board are, and what a gray picture scores."""
+def legend(board: Board, lettered: bool = True) -> str:
+    """What the letters or the marks of a board are, and its brackets, and what a gray picture scores. lettered: whether
+    it is a board of each display, whose rows have letters."""
     results, rows = board.results, [row for each in board.displays for row in each.rows]
     floors = [(each.floor, each.name) for each in board.displays if each.floor is not None]
     known = grouped((results.headline.with_unit(floor), name) for floor, name in floors)
     gray = [f"{value} on {words(names)}" if len(known) > 1 else value for value, names in known.items()]
-    texts = ["Methods of a group with one letter cannot be told apart."] * any(row.tier for row in rows)
+    texts = ["Methods of a group with one letter cannot be told apart."] if any(row.tier for row in rows) else []
+    if not lettered:
+        texts = [f"In brackets: the difference to {results.baseline}. *: no better than gray."]
     if any(row.test and verdict(results.headline, row.test) == UNSHOWN for row in rows):
         count = sum(not np.isnan(test.p) for test in results.tests.values())
         texts.append(f"°: {UNSHOWN} (p ≥ {SIGNIFICANCE:g}, adjusted for {count} comparisons).")
     texts += [f"A gray picture scores {'; '.join(gray)}."] * bool(gray)
     texts += [CONTROL] * bool(results.control)
-    return " ".join([*texts, "Brackets: 95 % intervals."])
+    return " ".join([*texts, *["Brackets: 95 % intervals."] * lettered])
 
 
 def _matrix(board: Board) -> Markdown | None:
