@@ -142,7 +142,7 @@ class Board:
             "panel_time": to_json(row.panel_time),
             "seconds": to_json(row.seconds),
             "memory_mib": to_json(row.memory),
-            "marks": list(row.marks),
+            "marks": self.marks(row),
         }
 
 

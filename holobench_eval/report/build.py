@@ -5,13 +5,16 @@ from __future__ import annotations
 import itertools
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..core.errors import UserError
 from ..core.io import write_atomically
 from ..study.definition import Study
+from ..study.plan import plan
 from .board import texts
 from .charts.look import MEDIA, drawn_for
 from .charts.tiles import draw_wall
@@ -19,7 +22,7 @@ from .description import Description, describe
 from .facts import Facts, facts_of
 from .markdown import DETAILS, REPORT, Markdown, blocks
 from .page import keep_copies, write_page
-from .results import Results, of_study, read_records, records_frame, records_text
+from .results import Results, difference, of_study, read_records, records_frame, records_text
 from .stories import parts
 from .stories.overview import chosen
 from .story import Report
@@ -90,13 +93,14 @@ def _figure(number: int, path: Path, caption: str) -> Markdown:
 
 
 def related(facts: Facts, folder: Path) -> dict[str, Results]:
-    """Results of the parts that predict, where they have a report in the folder of their study."""
-    known = {name: folder / name / "records.csv" for name in facts.related}
-    return {
-        name: Results(of_study(read_records(records_text(path)), facts.related[name]), facts.related[name])
-        for name, path in known.items()
-        if path.is_file()
-    }
+    """Results of the parts that predict, where the folder of their study has a report of theirs as they are now."""
+    known = dict[str, Results]()
+    for name, own in facts.related.items():
+        with suppress(UserError, OSError):  # there is none, or it is damaged, as its own check says
+            frame = read_records(records_text(folder / name / "records.csv"))
+            if not difference(frame, plan(own.study)):
+                known[name] = Results(of_study(frame, own), own)
+    return known
 
 
 def recompute_files(records_csv: str, facts: Facts) -> dict[str, str]:

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..core.errors import UserError, suggest
+from ..core.errors import UserError, one_line, suggest
 from ..core.io import CONTROLS, read_text
 from ..metrics import control
 from ..study.definition import Study
@@ -191,7 +191,10 @@ def records_text(path: Path) -> str:
 
 def read_records(text: str) -> pd.DataFrame:
     """The records frame from the text of records.csv. UserError: it is none, or a text would control a terminal."""
-    frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    try:
+        frame = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    except ValueError as error:  # pandas' own: empty, or of lines that do not fit
+        raise UserError(f"records.csv: {one_line(str(error))}") from error
     lacking = sorted(name for name, column in RECORDED.items() if "?" not in column.source and name not in frame)
     if lacking:
         raise UserError(f"records.csv lacks the columns {', '.join(lacking)}; it was written by another version")

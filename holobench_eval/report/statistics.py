@@ -25,6 +25,7 @@ FEWEST = 3
 MOST_ENUMERATED = 15  # clusters; of more, signs are drawn
 DRAWN = 20_000
 
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"  # of tiers
 Array = NDArray[np.float64]
 Clusters = Sequence[str] | NDArray[np.str_]
 FEWEST_DISPLAYS = 8  # of which a cause is looked for
@@ -196,17 +197,17 @@ def tiers(values: Array, margin: float, most: float, clusters: Clusters | None =
     rows, means = len(values), values.mean(1) if len(values) else values
     pairs = [(first, second) for first in range(rows) for second in range(first + 1, rows)]
     if not pairs:
-        return ["A"] * rows
+        return [LETTERS[0]] * rows
     adjusted = family_p(np.stack([values[i] - values[k] for i, k in pairs]), clusters)
     if np.isnan(adjusted).any():
         return [""] * rows
     p = dict(zip(pairs, adjusted, strict=True))
-    best, letters = 0, ["A"]
+    best, letters = 0, [LETTERS[0]]
     for row in range(1, rows):
         apart = abs(means[best] - means[row])
         if p[best, row] < SIGNIFICANCE and apart > margin:
-            best, letter = row, chr(ord(letters[-1]) + 1)
-            letters.append(letter if letter <= "Z" else "Z")
+            best = row
+            letters.append(LETTERS[(LETTERS.index(letters[-1]) + 1) % len(LETTERS)])
         elif apart > most:
             return [""] * rows
         else:

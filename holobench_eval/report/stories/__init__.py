@@ -44,7 +44,11 @@ def answer(results: Results) -> list[str]:
     few = too_few(results) if getattr(story, "TESTS", True) else ""
     verdicts = [verdict for verdict in (few, *story.verdicts(results)) if verdict]
     named = mentioned(results.labels, " ".join(verdicts))
-    if silent := [label for label in subjects(results) if label not in named]:
+    holes = {
+        label for label, name in results.cells if name in results.conditions and not results.is_complete(label, name)
+    }
+    lost = [label for label in subjects(results) if label in holes or results.baseline in holes]
+    if silent := [label for label in lost if label not in named]:
         verdicts[:0] = [f"Nothing is said of {words(silent)}: a score is missing, of a target or of the baseline."]
     return verdicts or ["Too many scores are missing for an answer."]
 

@@ -14,7 +14,7 @@ from ..board import Board, Display, Row, board
 from ..charts import paired
 from ..facts import CALIBRATED, ONLINE, OPEN_LOOP, ORACLE
 from ..markdown import Markdown, blocks, code, heading, table_of
-from ..phrases import ALIKE, UNSHOWN, difference, effect, too_few, verdict
+from ..phrases import ALIKE, MARGINS, UNSHOWN, difference, effect, too_few, verdict
 from ..results import Results
 from ..statistics import SIGNIFICANCE, PairedTest
 from ..story import Blocks, Figures, Part, Report, is_many, subjects
@@ -74,9 +74,15 @@ def _at_speed(results: Results, display: Display) -> Iterator[str]:
 def _yes(results: Results, tests: list[PairedTest]) -> Iterator[str]:
     """Yes or no, where a question asks whether its methods are better and all of them have one answer."""
     asked = ASKS.search(results.study.question) and not results.facts.labels("blind").intersection(subjects(results))
-    better = [effect(results.headline, test) == "better" for test in tests]
-    if asked and better and not too_few(results) and all(better) in (True, any(better)):
-        yield "Yes." if all(better) else "No."
+    told = {effect(results.headline, test) for test in tests}
+    if (
+        asked
+        and told
+        and "not tested" not in told
+        and not too_few(results)
+        and (told == {"better"} or "better" not in told)
+    ):
+        yield "Yes." if "better" in told else "No."
 
 
 def compared(results: Results, tests: list[PairedTest]) -> Iterator[str]:
@@ -116,7 +122,7 @@ def _best(results: Results, display: Display) -> Iterator[str]:
     first = max(single, key=lambda rows: results.headline.sign * rows[0].score.mean, default=[])
     blind = groups.get((OPEN_LOOP, False), []) if first is groups.get((CALIBRATED, False)) else []
     places = (
-        (first, f"Best{_among(results, first)}"),
+        (first, f"Best{_among(results, display, first)}"),
         (blind if blind and blind[0].test else [], "Without a camera"),
         (groups.get((OPEN_LOOP, True), []), "With several frames"),
         (groups.get((ONLINE, False), []), "With photographs of the picture itself"),
@@ -124,11 +130,12 @@ def _best(results: Results, display: Display) -> Iterator[str]:
     against = f" against {results.baseline}"
     for rows, where in places:
         if rows:
-            row, tied = rows[0], [row.label for row in rows if row.tier == "A"][:NAMED]
-            parts = [words(tied or [row.label])]
-            parts += ["not told apart"] * (len(tied) > 1) + [results.headline.with_unit(row.score.mean)] * (
-                rows is first
-            )
+            row, tied, shared = rows[0], [row.label for row in rows if row.tier == "A"][:NAMED], "alike"
+            if not tied and row.label == results.baseline:
+                unshown = [each.label for each in rows if each.test and verdict(results.headline, each.test) == UNSHOWN]
+                tied, shared = [row.label, *unshown][:NAMED], "not told apart"
+            parts = [words(tied or [row.label]), *[shared] * (len(tied) > 1)]
+            parts += [results.headline.with_unit(row.score.mean)] * (rows is first)
             if row.test and results.baseline not in tied:
                 mean = results.headline.with_unit(row.test.estimate.mean, signed=True)
                 is_known = rows is first and verdict(results.headline, row.test) != UNSHOWN
@@ -140,13 +147,15 @@ def _best(results: Results, display: Display) -> Iterator[str]:
             yield f"{where}: {', '.join(parts)}."
 
 
-def _among(results: Results, rivals: list[Row]) -> str:
-    """Among whom the best row leads, where the baseline was given more of the camera or the display and is better."""
+def _among(results: Results, display: Display, rivals: list[Row]) -> str:
+    """Among whom the best row leads, where the baseline has more of the camera, the display or the panel, and is
+    better."""
     test = rivals[0].test if rivals else None
     if test is None or not results.headline.better(0.0, test.estimate.mean):
         return ""
-    knows = results.category(test.first) == ORACLE
-    return " without knowing the display" if knows else " without photographs of the picture itself"
+    more = {ORACLE: " without knowing the display", ONLINE: " without photographs of the picture itself"}
+    several = any(row.frames > 1 for row in display.rows if row.label == results.baseline)
+    return more.get(results.category(test.first), " in one frame" * several)
 
 
 def published(results: Results, label: str, condition: str) -> float | None:
@@ -187,9 +196,12 @@ def legend(board: Board, lettered: bool = True) -> str:
     floors = [(each.floor, each.name) for each in board.displays if each.floor is not None]
     known = grouped((results.headline.with_unit(floor), name) for floor, name in floors)
     gray = [f"{value} on {words(names)}" if len(known) > 1 else value for value, names in known.items()]
-    texts = ["Methods of a group with one letter cannot be told apart."] if any(row.tier for row in rows) else []
+    least, letters = MARGINS.get(results.headline.unit, (0.0, 0.0))[0], any(row.tier for row in rows)
+    alike = f" by {least:g} {results.headline.unit} or more" if least else ""
+    texts = [f"Methods of a group with one letter are alike: no test tells them apart{alike}."] if letters else []
     if not lettered:
-        texts = [f"In brackets: the difference to {results.baseline}. *: no better than gray."]
+        against = f", in brackets the difference to {results.baseline}" if results.baseline else ""
+        texts = [f"{results.headline.axis}{against}. *: no better than gray."]
     if any(row.test and verdict(results.headline, row.test) == UNSHOWN for row in rows):
         count = sum(not np.isnan(test.p) for test in results.tests.values())
         texts.append(f"°: {UNSHOWN} (p ≥ {SIGNIFICANCE:g}, adjusted for {count} comparisons).")
@@ -221,7 +233,9 @@ def _matrix(board: Board) -> Markdown | None:
 
 def _cell(board: Board, row: Row) -> str:
     """``22.46 (+3.40)``, with the mark of a difference that is not shown."""
-    score = board.results.headline
+    score, total = board.results.headline, len(board.results.targets)
+    if row.scored < total:
+        return f"{score.number(row.score.mean)}, {row.scored} of {total} targets"
     gained = f" ({score.number(row.test.estimate.mean, signed=True)}{_sign(board, row)})" if row.test else ""
     return f"{score.number(row.score.mean)}{gained}{'*' * ('no better than gray' in row.marks)}"
 
@@ -279,7 +293,8 @@ def lacking(results: Results) -> str:
         of_all = f"all {total} targets" if total > 1 else "the target"
         where = f" on {condition}" * several
         who.append(f"{label}{where} lacks {of_all if len(names) == total else some}")
-    have = "1 method that has every target is" if ranked == 1 else f"{ranked} methods that have every target are"
+    noun = "row" if several else "method"
+    have = f"1 {noun} that has every target is" if ranked == 1 else f"{ranked} {noun}s that have every target are"
     state = f"Only the {have} ranked" if ranked else "No method is ranked, since none has every target"
     common = _in_common(results, {label for label, _ in lacks}) if results.study.measure == FILES else ""
     return f"{state}: {_first(who, LISTED)}. {_remedy(results, list(lacks.values()))}{common}"

@@ -5,6 +5,7 @@ report.md has the first page and the limits; details.md has the setup, the paire
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -102,10 +103,12 @@ def _parts(report: Report, _: Figures) -> Blocks:
             title, question, headed, answer = read_text(report.output / name / REPORT, MOST_BYTES).split("\n\n", 4)[:4]
             if (title[:2], headed, answer[:2]) != ("# ", heading("Answer"), "- "):
                 raise ValueError
-            told = (Markdown(text) for text in (title[2:], question, answer[2:].partition("\n")[0]))
+            texts = (title[2:], question, answer[2:].partition("\n")[0])  # of a file: no HTML and no link of it counts
+            told = (Markdown(text.replace("<", "&lt;").replace("](", "] (")) for text in texts)
             lines.append(Markdown("[{}]({}/{}). {} {}").format(next(told), name, REPORT, *told))
         except (UserError, OSError, ValueError) as error:
-            command = f"holoeval {'run' if isinstance(error, FileNotFoundError) else 'report'} {run}/{name}"
+            how = "run" if isinstance(error, FileNotFoundError) else "report"
+            command = f"holoeval {how} {run}/{name} --output {shlex.quote(str(report.output / name))}"
             lines.append(Markdown("{} has no report with an answer here: {} writes one.").format(name, code(command)))
     yield bullets(lines)
 
