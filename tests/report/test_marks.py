@@ -82,7 +82,7 @@ def test_a_network_without_photographs_is_dominated_by_what_is_as_fast(score, se
     rows = {"Network": (score, seconds), "Steps": (31.0, 1.0), "Many steps": (40.0, 9.0)}
     learned = {"learned": {"sha256": "2" * 64, "captures": photographs, "seconds": 1.0}}
     records = [
-        record(label, cell(label.lower(), target, DISPLAY), {"psnr_linear": value}, seconds=cost)
+        record(label, cell(label.lower(), target, DISPLAY), {"psnr_linear": value}, cpu_s=cost)
         | (learned if label == "Network" else {})
         for label, (value, cost) in rows.items()
         for target in TARGETS

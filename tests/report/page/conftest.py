@@ -41,7 +41,8 @@ def renamed(name: str) -> str:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
     folder = tmp_path_factory.mktemp("page")
     records = [
-        record | {"label": renamed(record["label"])} for record in synthetic.study(folder, size=48, targets=TARGETS)
+        record | {"label": renamed(record["label"]), "cpu_s": record["seconds"]}
+        for record in synthetic.study(folder, size=48, targets=TARGETS)
     ]
     pairs = tuple((renamed(label), condition) for label, condition in synthetic.facts().pairs)
     facts = synthetic.facts(title=TITLE, targets=TARGETS, pairs=pairs)

@@ -161,9 +161,12 @@ def test_a_score_of_models_is_judged_by_the_pairs_of_methods_that_it_orders() ->
 def test_the_answer_names_what_to_measure_where_it_pays() -> None:
     results = crossing(budget=budget(), models=models({"new": 0.9, "other": 0.5}, {"new": 20.0, "other": 25.0}))
     text = " ".join(answer(results))
-    assert re.search(r"To choose, measure an error budget: it names the best method on (9|10) of 10 displays", text)
-    assert "is best on 6 of 10." in text
-    assert "predict margins on displays left out: R2 1.00 of new." in text
+    assert "Best on most displays: old, on 6 of 10." in text
+    assert "To choose, measure an error budget: always taking old costs 0.22 dB in the mean;" in text
+    assert re.search(
+        r"an error budget names the best method on (9|10) of 10 displays left out and costs 0\.0[0-4] dB", text
+    )
+    assert "An error budget predicts margins on displays left out with R2 1.00 for new." in text
 
 
 def test_the_report_reads_the_parts_that_predict_in_its_folder(tmp_path: Path) -> None:
