@@ -207,7 +207,7 @@ def explain_plug_in(kind: plugins.Kind, screen: Console, name: str) -> None:
 
 
 def explain_profile(screen: Console, name: str) -> None:
-    """Print what a display profile is, the parameters of its stages, and its effects."""
+    """Print what a display profile is, its stages, and its effects."""
     from ..display import load_profile
     from ..display.resolution import refuse_far
     from ..report.description import simulated

@@ -110,7 +110,6 @@ def recompute_files(records_csv: str, facts: Facts) -> dict[str, str]:
 
 def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
     """Draw the charts of a report for one of ``MEDIA`` into a folder, and for a talk captures; every file."""
-    folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as drawn, drawn_for(MEDIA[medium]):
         printed = replace(report, keeps_pictures=True, drawn=Path(drawn))
         for part in parts():
@@ -119,6 +118,7 @@ def print_figures(report: Report, folder: Path, medium: str) -> Iterator[Path]:
         if MEDIA[medium].height:
             _draw_slide(printed)
         for path in sorted(Path(drawn).iterdir()):
+            folder.mkdir(parents=True, exist_ok=True)
             yield Path(shutil.copy(path, folder))
 
 

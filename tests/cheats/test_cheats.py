@@ -75,12 +75,11 @@ def digits(found: list[Any]) -> list[Any]:
 
 def test_the_page_on_trust_counts_the_attempts():
     cheats = [getattr(attempts, name) for name in NAMES if name != "Honest"]
-    page = (Path(__file__).parents[2] / "docs/start/trust.md").read_text()
-    counts = Counter((cheat.kind, cheat.outcome) for cheat in cheats)
-    for kind in {kind for kind, _ in counts}:
-        numbers = " | ".join(str(counts[kind, outcome] or "–") for outcome in ("impossible", "refused", "trusted"))
-        assert f"| {kind} | {numbers} |" in page
-    assert f"{len(cheats)} attempts" in page
+    page = " ".join((Path(__file__).parents[2] / "docs/start/trust.md").read_text().split())
+    counts = Counter(cheat.outcome for cheat in cheats)
+    assert f"{len(cheats)} attempts of methods" in page
+    assert f"{counts['impossible']} get the number of the honest phase, {counts['refused']} fail with a reason" in page
+    assert f"nothing prevents {counts['trusted']}:" in page
 
 
 @pytest.mark.parametrize("name", NAMES)

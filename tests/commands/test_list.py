@@ -74,7 +74,7 @@ def test_a_list_says_the_same_without_the_libraries_that_compute(command, capsys
 SAID = {
     "wirtinger": ("Source: Chakravarthula, Peng, ", "step = 0.1 (number above 0, at most 10) Adam's step [rad]"),
     "hil": ("is trained first", "retrieval.step = 0.06 (number above 0"),  # HIL's, not the class's own
-    "leto-2020": ("Version ", "crosstalk: width = 0.4687", "holoeval show leto-2020"),
+    "leto-2020": ("Version ", "crosstalk of 0.4687 px", "holoeval show leto-2020"),
     "drift": ("values [days] from 0 to 3650", "dust that settles", "sweeps: [{condition: drift"),
     "draw": ("count: 3",),
     "ssim": ("IEEE Trans. Image Process. 13", "columns: ssim_linear, ssim_amplitude, ssim_srgb"),
