@@ -1,8 +1,8 @@
 """Methods that try to look better than they are, each in a few lines. Every one shows the phase zero, honestly or not.
 
-``kind`` is the class of the attempt, ``outcome`` what has to come of it when the method runs in a process of its own:
-``impossible`` (the cell is that of the honest phase), ``refused`` (it fails, for ``reason``), ``trusted`` (nothing
-keeps a method from it, and docs/start/trust.md says so). ``calls``: 2 for what one call could do to the next.
+``outcome`` is what has to come of it when the method runs in a process of its own: ``impossible`` (the cell is that of
+the honest phase), ``refused`` (it fails, for ``reason``), ``trusted`` (nothing keeps a method from it, and
+docs/start/trust.md says so). ``calls``: 2 for what one call could do to the next.
 """
 
 import builtins
@@ -37,7 +37,6 @@ SEEN = {}
 class Attempt:
     """Has no settings, and neither has what derives from it."""
 
-    kind: ClassVar[str]
     outcome: ClassVar[str] = "impossible"
     reason: ClassVar[str] = ""
     calls: ClassVar[int] = 1
@@ -56,16 +55,16 @@ class Attempt:
     def cheat(self, target, bench): ...
 
 
-class Honest(Attempt, kind="none"): ...
+class Honest(Attempt): ...
 
 
-class Beside(Attempt, kind="none"): ...
+class Beside(Attempt): ...
 
 
 # --- reads the bench
 
 
-class ReadsTheBench(Attempt, kind="reads the bench"): ...
+class ReadsTheBench(Attempt): ...
 
 
 class AsksForTheSimulation(ReadsTheBench, reason="privileged = True"):
@@ -137,7 +136,7 @@ class RequestsTheDisplay(ReadsTheBench, reason="there is no '_display' here"):
 # --- patches the harness
 
 
-class PatchesTheHarness(Attempt, kind="patches the harness"): ...
+class PatchesTheHarness(Attempt): ...
 
 
 class PatchesTheMatch(PatchesTheHarness):
@@ -200,7 +199,7 @@ class ChangesTheEnvironment(PatchesTheHarness):
 # --- exceeds the budget
 
 
-class Photographer(Attempt, kind="exceeds the budget", camera=True):
+class Photographer(Attempt, camera=True):
     def photographed(self, phase, handles):
         """Captures taken before every handle refuses."""
         taken = 0
@@ -274,7 +273,7 @@ class RaisesItsBudget(Photographer):
         self.photographed(self.phase(target, bench)[0], [bench] * 10)
 
 
-class PhotographsWithoutACamera(Attempt, kind="exceeds the budget", reason="declares no camera"):
+class PhotographsWithoutACamera(Attempt, reason="declares no camera"):
     def cheat(self, target, bench):
         bench.capture(self.phase(target, bench)[0])
 
@@ -282,7 +281,7 @@ class PhotographsWithoutACamera(Attempt, kind="exceeds the budget", reason="decl
 # --- lies about time
 
 
-class LiesAboutTime(Attempt, kind="lies about time"): ...
+class LiesAboutTime(Attempt): ...
 
 
 @dataclass(frozen=True)
@@ -412,7 +411,7 @@ def outside():
     return numbers - {0, os.getpid()}
 
 
-class Reaching(Attempt, kind="reaches the process that scores"):
+class Reaching(Attempt):
     """Only from a namespace of its own, whose first process has forked it: without one it would really reach others."""
 
     def solve(self, target, bench):
@@ -515,7 +514,7 @@ class SlowsTheScorer(ReachingFurther):
 # --- keeps state
 
 
-class KeepsState(Attempt, kind="keeps state", calls=2): ...
+class KeepsState(Attempt, calls=2): ...
 
 
 class CountsItsCalls(KeepsState):
@@ -556,7 +555,7 @@ class Dressed(torch.Tensor):
         return torch.ones(3, 128, 128)
 
 
-class PoisonsRecords(Attempt, kind="poisons records"): ...
+class PoisonsRecords(Attempt): ...
 
 
 class ReturnsADressedTensor(PoisonsRecords, reason="a value is Dressed"):
@@ -608,7 +607,7 @@ class ClaimsAHugeTensor(PoisonsRecords, reason="no answer"):
 # --- ends the process
 
 
-class Ender(Attempt, kind="ends the process", outcome="refused"): ...
+class Ender(Attempt, outcome="refused"): ...
 
 
 class Exits(Ender, reason="exit code 0"):
@@ -651,7 +650,7 @@ class ClaimsThatTheDiskIsFull(Ender, reason="StorageError"):
         raise StorageError("the disk is full")
 
 
-class KillsItsParent(Attempt, calls=2, kind="ends the process"):
+class KillsItsParent(Attempt, calls=2):
     def cheat(self, target, bench):
         os.kill(os.getppid(), signal.SIGKILL)
 
@@ -696,14 +695,14 @@ class TakesAllMemory(Ender, reason="memory"):
 # --- exploits the noise's seed
 
 
-class ForeseesTheNoise(Attempt, kind="exploits the noise's seed", reason="_names"):
+class ForeseesTheNoise(Attempt, reason="_names"):
     def cheat(self, target, bench):
         from holobench_eval.core.seeds import generator
 
         return torch.randn(4, generator=generator("bench noise", *bench._names))
 
 
-class AsksForTheSeed(Attempt, kind="exploits the noise's seed", reason="seed"):
+class AsksForTheSeed(Attempt, reason="seed"):
     def cheat(self, target, bench):
         return bench._ask("seed")
 
@@ -711,7 +710,7 @@ class AsksForTheSeed(Attempt, kind="exploits the noise's seed", reason="seed"):
 # --- trains on the target
 
 
-class Trained(Attempt, kind="trains on the target", reason="no image it may be trained with"):
+class Trained(Attempt, reason="no image it may be trained with"):
     trains: ClassVar[bool] = True
 
     def prepare(self, bench):
@@ -766,7 +765,7 @@ class TrainsBeyondItsBudget(Trained, reason="capture"):
 # --- what a process of its own does not prevent
 
 
-class Trusted(Attempt, kind="leaves its process", outcome="trusted"): ...
+class Trusted(Attempt, outcome="trusted"): ...
 
 
 class KeepsAFile(Trusted, calls=2):
