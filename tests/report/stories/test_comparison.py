@@ -21,7 +21,7 @@ def test_a_display_without_a_difference_has_two_that_lead() -> None:
     means = {"old@a": 17.0, "new@a": 19.0, "old@b": 17.0, "new@b": 17.0}
     first, second = answer(results_of(means, noise=lambda label: NOISE if label == "old" else -NOISE))
     assert first == "a: Best: new, 18.95 dB, +1.90 dB [+1.49, +2.31] against old."
-    assert second == "b: Best: old and new, not told apart, 17.05 dB."
+    assert second == "b: Best: old and new, alike, 17.05 dB."
 
 
 def test_a_network_that_was_trained_without_photographs_stands_among_those_without_a_camera() -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from holobench_eval.display import load_profile
 from holobench_eval.metrics import control, error_budget
-from holobench_eval.report import Results
-from holobench_eval.report.build import related
+from holobench_eval.report import Results, build
 from holobench_eval.report.statistics import FEWEST_DISPLAYS, cause
 from holobench_eval.report.stories import answer, many_displays, story_of
 from holobench_eval.report.stories.many_displays import display_map, judged, margins, missed, parameters, shown_on
@@ -169,11 +168,16 @@ def test_the_answer_names_what_to_measure_where_it_pays() -> None:
     assert "An error budget predicts margins on displays left out with R2 1.00 for new." in text
 
 
-def test_the_report_reads_the_parts_that_predict_in_its_folder(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("differs", "names"), [("", ["budget"]), ("1 of 2 planned cells are not there", [])])
+def test_the_report_reads_the_parts_that_predict_and_are_as_planned(tmp_path, monkeypatch, differs, names) -> None:
     other = budget()
-    (tmp_path / "budget").mkdir()
     write_texts(other, tmp_path / "budget")
-    facts = replace(study().facts, related={"budget": other.facts, "not run": other.facts})
-    found = related(facts, tmp_path)
-    assert list(found) == ["budget"]
-    np.testing.assert_allclose(found["budget"].values("terms", DISPLAYS[3]), other.values("terms", DISPLAYS[3]))
+    write_texts(other, tmp_path / "damaged")
+    (tmp_path / "damaged" / "records.csv").write_text("")
+    monkeypatch.setattr(build, "plan", lambda study: study)
+    monkeypatch.setattr(build, "difference", lambda frame, grid: differs)
+    facts = replace(study().facts, related=dict.fromkeys(("budget", "damaged", "not run"), other.facts))
+    parts = build.related(facts, tmp_path)
+    assert list(parts) == names
+    for part in parts.values():
+        np.testing.assert_allclose(part.values("terms", DISPLAYS[3]), other.values("terms", DISPLAYS[3]))
