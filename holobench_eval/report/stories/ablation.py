@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..phrases import effect
+from ..phrases import MARGINS, effect
 from ..results import Results
 from ..text import grouped, words
 
@@ -34,21 +34,22 @@ def _variants(results: Results) -> dict[str, set[str]]:
 
 
 def verdicts(results: Results) -> Iterator[str]:
-    """One a display: what lowers, raises and does not move the score, and what another seed of the training moves."""
+    """Two a display: what lowers and raises the score; what does not, and what another seed of the training moves."""
     score, variants = results.headline, _variants(results)
     for condition in results.conditions:
         tests = [test for label in variants if (test := results.tested(label, condition))]
         reseeded = [test for test in tests if variants[test.second] == {"seed"}]
         changes = sorted((test for test in tests if test not in reseeded), key=lambda test: -abs(test.estimate.mean))
         groups, sentences, left = grouped((effect(score, test), test) for test in changes), list[str](), len(changes)
-        for told, word in (("worse", "Worse"), ("better", "Better")):
+        for told, word in (("worse", "Worse"), ("better", "Better"), ("not tested", "Untested")):
             same = groups.get(told, [])
             named = [f"{test.second}, {score.with_unit(test.estimate.mean, signed=True)}" for test in same[:NAMED]]
             more = f"; {len(same) - NAMED} more" if len(same) > NAMED else ""
             sentences += [f"{word}: {'; '.join(named)}{more}."] * bool(same)
             left -= len(same)
-        rest = f"{left} of {len(changes)} changes are not shown to matter."
+        least = f"change it by less than {MARGINS[score.unit][0]:g} {score.unit} or " if score.unit in MARGINS else ""
+        rest = [f"{left} of {len(changes)} {least}are not shown to change it."] * bool(left)
         moved = [score.with_unit(abs(test.estimate.mean)) for test in reseeded]
         chance = [f"Another seed: {words(moved)}."] * bool(moved)
-        if changes:
-            yield f"{f'{condition}: ' * (len(results.conditions) > 1)}{' '.join([*sentences, rest, *chance])}"
+        for part in (sentences, [*rest, *chance]) if changes else ():
+            yield f"{f'{condition}: ' * (len(results.conditions) > 1)}{' '.join(part)}" * bool(part)

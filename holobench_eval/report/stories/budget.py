@@ -9,10 +9,11 @@ from ..board import board
 from ..charts.curves import draw_costs
 from ..charts.look import looks
 from ..facts import OFFLINE, ONLINE
-from ..phrases import effect, value
+from ..phrases import effect
 from ..results import Results
 from ..story import Report, is_many
 from ..text import grouped, number, words
+from .prediction import is_untestable, leader
 
 ORDER = 90
 QUESTION = "How many captures does a method need, and what do more captures buy?"
@@ -49,7 +50,8 @@ def _families(results: Results, condition: str) -> dict[str, list[tuple[float, s
 def verdicts(results: Results) -> Iterator[str]:
     """One a display: the fewest photographs with which each method beats the baseline, who never does, and the best."""
     baseline = results.baseline
-    for condition in results.conditions:
+    for display in board(results).displays:
+        condition = display.name
         passed, failed = list[tuple[float, str]](), list[str]()
         families = _families(results, condition)
         for name, rows in families.items():
@@ -60,13 +62,15 @@ def verdicts(results: Results) -> Iterator[str]:
         few = [text for _, text in sorted(passed)]
         sentences = [f"Photographs that it takes to beat {baseline}: {', '.join(few)}."] * bool(few)
         sentences += [f"With no number tried: {words(failed)}."] * bool(few and failed)
-        if failed and not few:
+        if failed and is_untestable(results):
+            sentences = [f"Too few targets to test against {baseline}: {words(failed)}."]
+        elif failed and not few:
             sentences = [f"No: with no number of photographs tried {words(failed)} is shown to beat {baseline}."]
-        best = results.ranking(condition, categories=(*OFFLINE, ONLINE))[0]
-        cost = f" with {number(_captures(results, best, condition))}" * (best != baseline)
-        if families:
+        ranked = results.ranking(condition, categories=(*OFFLINE, ONLINE))
+        if families and ranked:
+            cost = f" with {number(_captures(results, ranked[0], condition))}" * (ranked[0] != baseline)
             begin = f"{condition}: " * (len(results.conditions) > 1)
-            yield f"{begin}{' '.join(sentences)} Best: {best}{cost}, {value(results, best, condition)}."
+            yield f"{begin}{' '.join([*sentences, leader(results, display, ranked, cost)])}"
 
 
 def figures(report: Report) -> Iterator[tuple[Path, str]]:

@@ -30,6 +30,7 @@ from ..story import Report, is_many, subjects
 from ..text import words
 from .comparison import published
 from .error_budget import budgets
+from .prediction import is_untestable
 
 ORDER = 70
 QUESTION = "On how many of the displays is a method better than the baseline, and by how much over all of them?"
@@ -112,7 +113,10 @@ def verdicts(results: Results) -> Iterator[str]:
 def _beats(results: Results, row: Margin, count: int) -> str:
     score, worse = results.headline, f" and loses on {row.worse}" * bool(row.worse)
     ends = " to ".join(score.number(end, signed=True) for end in (row.low, row.high))
-    text = f"{row.label} beats {results.baseline} on {row.better} of {count} displays{worse}: median "
+    beats = f"beats {results.baseline} on {row.better} of {count} displays{worse}"
+    if is_untestable(results):
+        beats = f"against {results.baseline} on {count} displays, untested"
+    text = f"{row.label} {beats}: median "
     text += f"{score.with_unit(row.median, signed=True)}, nine in ten {ends}."
     margin = published(results, row.label, results.conditions[0])
     if margin is None:
@@ -131,8 +135,8 @@ def _best(results: Results) -> Iterator[str]:
     """The method that is best on most displays, and whether an error budget of a display tells where another is."""
     gained, known, score = gains(results), display_map(results), results.headline
     count, best = len(gained), gained.idxmax(axis=1).value_counts().reindex(gained.columns, fill_value=0)
-    usual = str(best.idxmax())
-    yield f"Best on most displays: {usual}, on {best[usual]} of {count}."
+    usual, tied = str(best.idxmax()), [str(label) for label in best.index[best == best.max()]]
+    yield f"Best on most displays: {words(tied)}, on {best[usual]} of {count}{' each' * (len(tied) > 1)}."
     if known:
         always, asked = (known.behind(margins) for margins in (gained[usual], known.chosen))
         nothing, budget = f"always taking {usual} costs {score.with_unit(always)}", f"costs {score.with_unit(asked)}"
@@ -242,6 +246,7 @@ def judged(results: Results) -> dict[str, tuple[int, int]]:
 def table(board: Board) -> Markdown | None:
     """A row for every method."""
     score, count = board.results.headline, len(shown_on(board.results))
+    is_tested = not is_untestable(board.results)
     return table_of(
         [
             {
@@ -249,8 +254,8 @@ def table(board: Board) -> Markdown | None:
                 f"over displays and pictures{score.brackets}": score.estimate(row.over_both, signed=True),
                 f"median{score.brackets}": score.number(row.median, signed=True),
                 "5 to 95 % of displays": " to ".join(score.number(end, signed=True) for end in (row.low, row.high)),
-                f"better on [of {count}]": row.better,
-                "worse on": row.worse,
+                f"better on [of {count}]": row.better if is_tested else "–",
+                "worse on": row.worse if is_tested else "–",
             }
             for row in margins(board.results)
         ]
