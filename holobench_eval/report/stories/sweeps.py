@@ -153,13 +153,18 @@ def _costs(results: Results, here: list[list[Point]], label: str) -> Iterator[st
         lead = next(point.lead for point in points if point.is_before)
         if lead is None:
             yield f"{cost}."
-        elif lead.mean <= 0:
-            yield f"{cost}. It has no lead over {baseline} to lose: {score.with_unit(lead.mean, signed=True)} before."
+        elif not lead.low > 0:
+            no = "It has no lead" if lead.mean <= 0 else "No lead is shown"
+            yield f"{cost}. {no} over {baseline} to lose: {score.with_unit(lead.mean, signed=True)} before."
         else:
-            leads = (point.lead.mean for point in points if point.lead and not point.is_before)
-            least = min(leads, default=lead.mean)
-            ends = "keeps a lead" if least > 0 else "loses its lead"
-            yield f"{cost}. It {ends} over {baseline}: {score.with_unit(least, signed=True)} at least."
+            leads = [point.lead for point in points if not point.is_before]
+            least = min((lead for lead in leads if lead), key=lambda lead: lead.mean, default=lead)
+            told = f"Its lead over {baseline} is not shown to stay"
+            if all(lead and lead.low > 0 for lead in leads):
+                told = f"It keeps a lead over {baseline}"
+            elif least.high < 0:
+                told = f"It loses its lead over {baseline}"
+            yield f"{cost}. {told}: {score.with_unit(least.mean, signed=True)} at least."
 
 
 def _moved(score: Score, loss: Estimate) -> str:
@@ -184,7 +189,7 @@ def _seen(results: Results, here: list[list[Point]]) -> Iterator[str]:
 
 def _ranges(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """How far a lens moves the picture for a small loss."""
-    lenses = [points for points in here if points[0].kind == "refocus"]
+    lenses = [points for points in here if points[0].kind == "refocus" and results.headline.unit == "dB"]
     ranges = grouped((reach, points[0].method) for points in lenses if (reach := small_range(points)))
     if ranges:
         each = [f"{reach} with {words(labels)}" for reach, labels in ranges.items()]
@@ -213,7 +218,8 @@ def small_range(points: list[Point]) -> str | None:
 
 def _recovered(results: Results, here: list[list[Point]]) -> Iterator[str]:
     """What share of a loss of the baseline each remedy gets back, from the worst to the best value."""
-    known, parts = {points[0].kind: points for points in here if points[0].method == results.baseline}, []
+    own = [points for points in here if points[0].method == results.baseline and results.headline.unit == "dB"]
+    known, parts = {points[0].kind: points for points in own}, list[str]()
     for kind in REMEDIES:
         if kind in known and "eye" in known:
             shares = sorted(recovered(results, known["eye"], known[kind]), key=lambda share: share.mean)
@@ -221,8 +227,12 @@ def _recovered(results: Results, here: list[list[Point]]) -> Iterator[str]:
             parts += [f"{ends} % with {KINDS[kind].words}"] * bool(ends)
     if parts:
         yield f"Of the loss comes back: {'; '.join(parts)}."
-    elif known.keys() & {*REMEDIES}:
-        yield f"No eye loses more than {SMALL:g} dB."
+    elif "eye" in known and known.keys() & {*REMEDIES}:
+        losses = [point.loss for point in known["eye"] if not point.is_before]
+        if all(loss and loss.mean <= SMALL for loss in losses):
+            yield f"No eye costs {results.baseline} more than {SMALL:g} dB, so there is little to get back."
+        else:
+            yield f"What comes back of the loss of {results.baseline} is not shown."
 
 
 def recovered(results: Results, eyes: list[Point], cures: list[Point]) -> list[Estimate]:

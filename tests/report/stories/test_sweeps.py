@@ -85,7 +85,7 @@ def test_what_a_remedy_gets_back_is_told_as_a_share_of_what_was_lost() -> None:
     assert recovered(study(), eyes["Wirtinger"], cures["Wirtinger"]) == []  # it lost nothing
     (verdict,) = answer(study(baseline="HIL"))
     assert verdict == "Of the loss comes back: 88 [88, 88] % with the same eye, known to the methods."
-    assert answer(study()) == ["No eye loses more than 1 dB."]
+    assert answer(study()) == ["No eye costs Wirtinger more than 1 dB, so there is little to get back."]
 
 
 WITHOUT_EYES = tuple(swept for swept in facts().sweeps if "eye" not in swept.kind)
@@ -116,20 +116,21 @@ def test_a_claim_is_judged_as_far_as_it_goes(claim: Claim, verdict: str) -> None
     assert answer(study(sweeps=changed, question="Does HIL stay?"))[1].startswith(verdict)
 
 
-def changed(swept: Swept, means: Mapping[str, tuple[float, ...]]) -> str:
-    """The answer of a study of one change; means: of each method before it and at each value."""
+def changed(swept: Swept, means: Mapping[str, tuple[float, ...]], key: str = "psnr_linear") -> str:
+    """The answer of a study of one change; means: of each method before it and at each value, NaN for no score."""
     conditions = [swept.before, *(name for _, name in swept.points)]
     records = [
         synthetic.record(
             label,
             synthetic.cell(label, target, condition, params={"label": label}),
-            {"psnr_linear": mean + 0.1 * index * (label == "old")},
+            {key: mean + 0.1 * index * (label == "old")} if mean == mean else {},
+            state="done" if mean == mean else "failed",
         )
         for label, values in means.items()
         for condition, mean in zip(conditions, values, strict=True)
         for index, target in enumerate(TARGETS)
     ]
-    return "\n".join(answer(synthetic.results(records, baseline="old", sweeps=(swept,))))
+    return "\n".join(answer(synthetic.results(records, baseline="old", sweeps=(swept,), headline=key)))
 
 
 def test_places_of_a_pupil_say_which_methods_are_above_the_baseline_at_each() -> None:
@@ -144,3 +145,32 @@ def test_refocusing_says_how_far_a_lens_moves_the_picture() -> None:
     how, where = text.split(": ")
     assert how == "A lens moves the picture at a loss of 1 dB at most"
     assert where == "-2 or less to 2 or more mm with old; nowhere with new."
+
+
+@pytest.mark.parametrize(
+    ("means", "told"),
+    [
+        ((24.0, 23.0, 22.0), "It keeps a lead over old: +1.85 dB at least."),
+        ((24.0, 23.0, float("nan")), "Its lead over old is not shown to stay: +2.85 dB at least."),
+        ((24.0, 23.0, 20.2), "Its lead over old is not shown to stay: +0.05 dB at least."),
+        ((24.0, 23.0, 18.0), "It loses its lead over old: -2.15 dB at least."),
+        ((20.2, 20.2, 20.2), "No lead is shown over old to lose: +0.05 dB before."),
+    ],
+)
+def test_a_lead_stays_where_every_value_shows_it(means: tuple[float, ...], told: str) -> None:
+    swept = Swept("drift", "bench", ((30.0, "bench, 30"), (60.0, "bench, 60")))
+    assert changed(swept, {"old": (20.0, 20.0, 20.0), "new": means}).endswith(told)
+
+
+def test_a_loss_without_a_score_is_no_small_loss() -> None:
+    results = study(baseline="HIL", question="")
+    lost = (results.frame["condition"] == title("eye", "-2")) & (results.frame["target"] == "a")
+    results.frame.loc[lost, ["state", "psnr_linear"]] = "failed", float("nan")
+    assert answer(results) == ["What comes back of the loss of HIL is not shown."]
+
+
+def test_a_headline_without_decibels_is_told_no_small_loss() -> None:
+    swept = Swept("refocus", "bench", ((1.0, "bench, 1 mm"), (2.0, "bench, 2 mm")))
+    text = changed(swept, {"old": (0.9, 0.8, 0.5), "new": (0.9, 0.7, 0.4)}, key="ssim_linear")
+    assert " 1 at most" not in text
+    assert "dB" not in text
