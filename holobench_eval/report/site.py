@@ -174,14 +174,14 @@ def _identity(folder: Path, name: str, known: Mapping[str, Any]) -> tuple[str, s
 
 
 def _answer(folder: Path, name: str, displays: Sequence[str]) -> list[str]:
-    """The answer of report.md: what it says of the display, or all of it where it does not go by displays."""
+    """The answer of report.md: what it says of no display alone, then what it says of this one."""
     text = _ANSWER.search(read_text(folder / "report.md", MOST_BYTES))
     lines = [plain(line[2:]) for line in (text[1] if text else "").splitlines() if line.startswith("- ")]
-    of_displays = [
-        line for line in lines if line.startswith(tuple(f"{each}{sign} " for each in displays for sign in ":,"))
+    general = [
+        line for line in lines if not line.startswith(tuple(f"{each}{sign} " for each in displays for sign in ":,"))
     ]
-    own = [line.removeprefix(f"{name}: ") for line in of_displays if line.startswith((f"{name}: ", f"{name}, "))]
-    return own if of_displays else lines
+    own = [line.removeprefix(f"{name}: ") for line in lines if line.startswith((f"{name}: ", f"{name}, "))]
+    return [*general, *own]
 
 
 def _picture(folder: Path) -> dict[str, Any] | None:

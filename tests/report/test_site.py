@@ -56,7 +56,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, study: list[dict[str, Any]]) 
     folder = tmp_path_factory.mktemp("site")
     own = write_results(folder / "reports" / "ours", study)
     (own / "report.md").write_text(
-        "## Answer\n\n- leto-aged: HIL leads \\*.\n- ideal, both: even.\n\n## More\n\n- No.\n"
+        "## Answer\n\n- Few targets.\n- leto-aged: HIL leads \\*.\n- ideal, both: even.\n\n## More\n\n- No.\n"
     )
     (own / "figures").mkdir()
     Image.new("RGB", (40, 20)).save(own / "figures" / "answer-pictures.jpg")
@@ -93,7 +93,7 @@ def test_texts_open_no_element_and_the_policy_lets_nothing_in(site: Site) -> Non
 
 def test_a_card_has_the_answer_of_its_display_and_the_best_row_of_each_group_with_its_difference(site: Site) -> None:
     aged = site.text.partition("<h2>leto-aged</h2>")[2].partition("</section>")[0]
-    assert "HIL leads *." in aged
+    assert 0 < aged.index("Few targets.") < aged.index("HIL leads *.")  # what is said of all displays is on each card
     assert "even." not in aged
     order = ["With photographs of the picture itself", ">HIL<", "No camera", ">Wirtinger<", "Knows the display"]
     places = [aged.index(text) for text in order]
@@ -103,6 +103,17 @@ def test_a_card_has_the_answer_of_its_display_and_the_best_row_of_each_group_wit
     assert aged.count("<article") == aged.count("4 targets.") == aged.count("Seconds on A processor.") == 1
     assert '<td class="difference">+' in aged
     assert "ideal, both: even." in site.text
+
+
+def test_the_only_row_of_a_group_that_lacks_targets_says_so(tmp_path: Path, study: list[dict[str, Any]]) -> None:
+    def lost(record: dict[str, Any]) -> bool:
+        return record["label"] == "Oracle" and record["cell"]["target"] != TARGETS[0]
+
+    records = [record | {"state": "failed", "scores": {}} if lost(record) else record for record in study]
+    write_site([write_results(tmp_path / "ours", records)], tmp_path / "site")
+    text = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
+    assert text.count("1 of 4 targets") == 2  # on each display
+    assert "4 of 4 targets" not in text
 
 
 def test_a_display_of_another_version_is_a_display_of_its_own(site: Site) -> None:
