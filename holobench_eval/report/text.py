@@ -144,7 +144,7 @@ PREDICTION = Text(
         "method's own holograms are shown."
     ),
     picture=(
-        'The column "capture" shows the capture of the hologram by {holograms}, registered and matched to the target; '
+        'The column "target" shows the capture of the hologram by {holograms}, registered and matched to the target; '
         "each prediction is matched to it in intensity; all are sRGB-encoded"
     ),
 )
