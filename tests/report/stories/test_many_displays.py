@@ -46,6 +46,21 @@ def test_few_displays_and_oracles_alone_are_no_comparison_over_displays():
     assert story_of(results_of(many)) is many_displays
 
 
+def test_methods_that_are_best_on_as_many_displays_are_all_named():
+    results = study(
+        lambda name: 2.0 if name < "leto-2020-06" else -2.0, noise=lambda label: NOISE + 0.5 * (label == "other")
+    )
+    assert "Best on most displays: other and new, on 5 of 10 each." in answer(results)
+
+
+def test_on_two_clusters_no_display_is_counted_as_one_without_a_difference():
+    results = study(lambda name: 2.0)
+    results.frame["cluster"] = ["a" if target in EIGHT[:4] else "b" for target in results.frame["target"]]
+    text = " ".join(answer(results))
+    assert "new against old on 10 displays, untested: median +2.05 dB" in text
+    assert "beats" not in text
+
+
 def test_a_display_that_lacks_a_score_is_left_out_and_named():
     results = study()
     lost = (results.frame["condition"] == DISPLAYS[3]) & (results.frame["target"] == "t2")
