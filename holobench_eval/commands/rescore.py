@@ -28,13 +28,16 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     for name in metric or ():
         if name not in grids[0][2].metrics:
             raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grids[0][2].metrics)}")
-    for study, folder, grid in reversed(grids):  # the first study's report has the answers of its parts
+    for study, folder, _ in grids:
         if not Store(folder).folder.is_dir():
             raise UserError(f"{folder} has no captures; holoeval run {as_typed(study.config)} takes them")
+    for study, folder, grid in reversed(grids):  # the first study's report has the answers of its parts
+        wanted = tuple(name for name in metric or grid.metrics if name in grid.metrics)
+        if not wanted:  # of a part that has none of these metrics; without any, all of it would be run
+            continue
         real, panel = study.display.real, study.display.panel
         where = executors.Serial() if real else executors.executor("auto", None, is_small(panel))
         many = thread_count(threads, where.workers, study)
-        wanted = tuple(name for name in metric or grid.metrics if name in grid.metrics)
         with watching(console) as watch:
             outcome = compute(study, grid, folder, where, watch, many, ARTIFACTS, rescore=wanted)
         how = "without its record holoeval run photographs each again" if real else "holoeval run computes them"

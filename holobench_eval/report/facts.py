@@ -25,8 +25,8 @@ from ..study.plan import is_reference
 from ..study.stacks import at_once, stacks_of
 from .text import Text, plain, text_of
 
-# Who competes with whom: methods are ranked among those that were given as much of the camera. In the order of tables.
-CATEGORIES = OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN = "open loop", "calibrated", "online", "oracle", "given"
+# Who competes with whom: methods are ranked among those that were given as much of the camera.
+OPEN_LOOP, CALIBRATED, ONLINE, ORACLE, GIVEN = "open loop", "calibrated", "online", "oracle", "given"
 FLOOR = "floor"  # in files, of rows that no method made
 # Methods that, as far as is known, never see a capture of the scored image: their holograms are ready before it.
 OFFLINE = (OPEN_LOOP, CALIBRATED, GIVEN)

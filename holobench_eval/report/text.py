@@ -101,18 +101,6 @@ class Text:
     compared: str = "in linear light"
     picture: str = "Each capture is registered, matched in intensity and sRGB-encoded"
 
-    def floor_name(self, name: str) -> str:
-        """What a floor row shows."""
-        wrong = "the wrong target" if self.truth == "target" else f"the {self.truth} of the wrong target"
-        return {
-            "floor_constant": "a constant image",
-            "floor_black": "a black image",
-            "floor_speckle": "pure speckle",
-            "floor_wrong_target": wrong,
-            "floor_mirrored": f"the mirrored {self.truth}",
-            "floor_shift_1px": f"the {self.truth} shifted by 1 px",
-        }[name]
-
 
 ON_A_NETWORK = Text(
     scored="predicted capture",

@@ -137,3 +137,15 @@ def test_a_damaged_report_of_a_part_is_told_and_costs_no_report(config, call, in
     text = (folder / "report.md").read_text()
     assert "bars has no report with an answer here: `holoeval report toy.yaml/bars" in text
     assert "`holoeval run toy.yaml/one-step" in text
+
+
+@pytest.mark.slow
+def test_a_part_without_a_metric_is_left_alone_where_the_metric_is_scored_again(config, call, in_process):
+    config.write_text(CONFIG.partition("  one-step:")[0] + "    protocol: {metrics: [psnr]}\n")
+    for study in (config, f"{config}/bars"):
+        assert call("run", study)[0] == 0
+    lost = min(Path("holoeval-results/toy/bars/records").glob("*.json"))
+    lost.unlink()
+    code, printed, _ = call("rescore", config, "--metric", "ssim")
+    assert (code, printed.count("captures scored again")) == (0, 1)
+    assert not lost.exists()  # it would be computed, had the part been run
