@@ -28,9 +28,13 @@ def rescore(config: Config, output: Output = None, metric: Metrics = None, threa
     for name in metric or ():
         if name not in grids[0][2].metrics:
             raise UserError(f"--metric {name}: the study has no such metric; {suggest(name, grids[0][2].metrics)}")
-    for study, folder, _ in grids:
-        if not Store(folder).folder.is_dir():
-            raise UserError(f"{folder} has no captures; holoeval run {as_typed(study.config)} takes them")
+    for study, folder, grid in grids:
+        store, again = Store(folder), f"holoeval run {as_typed(study.config)}"
+        if not store.folder.is_dir():
+            raise UserError(f"{folder} has no captures; {again} takes them")
+        if all(record["state"] == "missing" for record in store.load(grid)):  # an empty report would replace a good one
+            changed = "the study or the code has changed"
+            raise UserError(f"{folder}: no cell of this study has a record here ({changed}); {again} computes them")
     for study, folder, grid in reversed(grids):  # the first study's report has the answers of its parts
         wanted = tuple(name for name in metric or grid.metrics if name in grid.metrics)
         if not wanted:  # of a part that has none of these metrics; without any, all of it would be run

@@ -149,3 +149,15 @@ def test_a_part_without_a_metric_is_left_alone_where_the_metric_is_scored_again(
     code, printed, _ = call("rescore", config, "--metric", "ssim")
     assert (code, printed.count("captures scored again")) == (0, 1)
     assert not lost.exists()  # it would be computed, had the part been run
+
+
+@pytest.mark.slow
+def test_a_study_that_has_changed_is_not_scored_again_over_its_good_report(config, call, in_process):
+    config.write_text(CONFIG.partition("parts:")[0])
+    assert call("run", config)[0] == 0
+    report = Path("holoeval-results/toy/report.md")
+    good = report.read_bytes()
+    config.write_text(f"{config.read_text()}seed: 5\n")
+    code, _, error = call("rescore", config)
+    assert (code, "no cell of this study has a record here" in error) == (2, True)
+    assert report.read_bytes() == good
